@@ -9,7 +9,7 @@ FMU, and restored.
 `binary_problem` says why an FMU cannot be loaded on this platform, `runs_as` whether one that was built from
 Python runs as native code.
 
-`kept_in` lists the entries of a cache folder: their kinds, sizes, and whether they are intact.
+`kept_in` lists the entries of a cache folder.
 """
 
 from __future__ import annotations
@@ -28,20 +28,20 @@ import sys
 import tempfile
 import zipfile
 import zlib
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
-from functools import lru_cache, partial
+from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from yawbench.foundation.cache import STORES, cache_folders, content_of, delete_unused, hold
+from yawbench.foundation.cache import STORES, cache_folders, delete_unused, hold
 from yawbench.foundation.errors import ModelDescriptionError
 from yawbench.foundation.messages import closest, listed, short
-from yawbench.foundation.safe_files import PACKED, ArchiveError, TooLargeError, members, read_bytes, reason
+from yawbench.foundation.safe_files import PACKED, read_bytes, reason
 
 from . import description as fmu_description
 from .description import binary_of, platform
 from .fmu import Fmu, RunsAs
+from .zip_members import ArchiveError, members
 
 FORMAT = 12
 """Format version of cache entries; part of their names, so versions of this program can share a cache."""
@@ -161,7 +161,7 @@ def _read_member(path: Path) -> bytes:
 
 def _load(entry: Path, path: Path) -> Fmu | None:
     """Return the FMU of a cache entry, None if there is none or it is damaged."""
-    record = whole_entry(entry)
+    record = _whole_entry(entry)
     if record is None:
         return None
     try:
@@ -173,7 +173,7 @@ def _load(entry: Path, path: Path) -> Fmu | None:
     return fmu
 
 
-def whole_entry(entry: Path) -> dict[str, Any] | None:
+def _whole_entry(entry: Path) -> dict[str, Any] | None:
     """Return the record of a cache entry, None if one of its files is missing or has changed."""
     try:
         record: dict[str, Any] = json.loads((entry / "description.json").read_bytes())
@@ -199,8 +199,6 @@ def _files(raw: bytes, path: Path) -> dict[str, bytes]:
         with zipfile.ZipFile(io.BytesIO(raw)) as archive:
             contents = {name: archive.read(info) for name, info in members(archive).items()}
     except ArchiveError as error:
-        raise ModelDescriptionError(f"{path}: {error}", code="fmu-damaged") from None
-    except TooLargeError as error:
         raise ModelDescriptionError(f"{path}: cannot read this FMU: {error}", code="fmu-damaged") from None
     except _DAMAGE as error:
         if raw[:2] != b"PK":
@@ -215,7 +213,7 @@ def _files(raw: bytes, path: Path) -> dict[str, bytes]:
 
 
 def _make_entry(files: dict[str, bytes], fmu: Fmu, entry: Path) -> None:
-    """Unpack into a scratch folder, then rename it to the entry, or repair a damaged entry from it."""
+    """Unpack into a scratch folder, then rename it to the entry, or put it in place of a damaged one."""
     entry.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
     scratch = Path(tempfile.mkdtemp(prefix=".unpacking-", dir=entry.parent))
     try:
@@ -233,70 +231,34 @@ def _make_entry(files: dict[str, bytes], fmu: Fmu, entry: Path) -> None:
         except OSError:
             if not entry.is_dir():
                 raise
-            if _load(entry, fmu.path) is None:
-                _repair(entry, scratch, files)
+            if _load(entry, fmu.path) is None:  # damaged; processes that use it keep its open files
+                shutil.rmtree(entry, ignore_errors=True)
+                os.rename(scratch, entry)
     finally:
         shutil.rmtree(scratch, ignore_errors=True)
     delete_unused(entry.parent, r"\.unpacking-.*|[0-9a-f]{32}-\d+")
 
 
-def _repair(entry: Path, scratch: Path, files: Iterable[str]) -> None:
-    """Replace the files one by one, so that a process using the entry keeps its open files."""
-    for name in (*(f"fmu/{name}" for name in files), "description.json"):
-        target = entry / name
-        if target.is_dir():
-            shutil.rmtree(target)
-        target.parent.mkdir(parents=True, exist_ok=True)
-        os.replace(scratch / name, target)
-    for compiled in entry.rglob("__pycache__"):  # perhaps compiled from the damaged module
-        shutil.rmtree(compiled, ignore_errors=True)
-
-
-@dataclass(frozen=True)
-class CacheEntry:
-    """An entry of the cache: a file or a folder, and a function that checks whether it is intact."""
-
-    path: Path
-    whole: Callable[[], bool]
-
-    @property
-    def size(self) -> int:
-        """Total size of its files [B]."""
-        files = self.path.rglob("*") if self.path.is_dir() else [self.path]
-        return sum(file.lstat().st_size for file in files if not file.is_dir())
-
-
-def kept_in(folder: Path) -> dict[str, list[CacheEntry]]:
+def kept_in(folder: Path) -> dict[str, list[Path]]:
     """Return kind -> entries of a cache folder; other files there are not ours and left out."""
-    entries_by_kind: dict[str, list[CacheEntry]] = {
-        "unpacked FMUs": [],
-        **{name: [_file(file) for file in folder.glob(f"{store}/*")] for store, name in STORES.items()},
-        "FMUs": [CacheEntry(file, partial(_zip_is_whole, file)) for file in folder.glob("fmus/*/*.fmu")],
-        "left over": [],
+    unpacked = re.compile(rf"[0-9a-f]{{32}}-{FORMAT}")
+    left_over = re.compile(r"[0-9a-f]{32}-\d+|\.unpacking-.*")  # of other versions, or interrupted
+    names = {path.name: path for path in folder.iterdir()}
+    entries_by_kind = {
+        "unpacked FMUs": [path for name, path in names.items() if unpacked.fullmatch(name)],
+        **{name: [*folder.glob(f"{store}/*")] for store, name in STORES.items()},
+        "FMUs": [*folder.glob("fmus/*/*.fmu")],
+        "left over": [
+            path for name, path in names.items() if left_over.fullmatch(name) and not unpacked.fullmatch(name)
+        ],
     }
-    for path in folder.iterdir():
-        match = re.fullmatch(r"[0-9a-f]{32}-(\d+)", path.name)
-        if match and int(match[1]) == FORMAT:
-            entries_by_kind["unpacked FMUs"].append(CacheEntry(path, partial(_entry_is_whole, path)))
-        elif match or path.name.startswith(".unpacking-"):
-            entries_by_kind["left over"].append(
-                CacheEntry(path, lambda: True)
-            )  # of other versions, or interrupted
     return {kind: entries for kind, entries in entries_by_kind.items() if entries}
 
 
-def _file(file: Path) -> CacheEntry:
-    return CacheEntry(file, lambda: content_of(file) is not None)
-
-
-def _entry_is_whole(entry: Path) -> bool:
-    return whole_entry(entry) is not None
-
-
-def _zip_is_whole(file: Path) -> bool:
-    with contextlib.suppress(zipfile.BadZipFile, OSError), zipfile.ZipFile(file) as archive:
-        return archive.testzip() is None
-    return False
+def size_of(entry: Path) -> int:
+    """Return the total size of the files of an entry [B]."""
+    files = entry.rglob("*") if entry.is_dir() else [entry]
+    return sum(file.lstat().st_size for file in files if not file.is_dir())
 
 
 REASON = "extra/org.yawbench.native/native.txt"

@@ -14,13 +14,14 @@ import contextlib
 import functools
 import os
 import sys
+import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from yawbench.foundation.errors import BuildError, Diagnostic
-from yawbench.foundation.safe_files import draft_of, remove_draft
+from yawbench.foundation.safe_files import write_whole
 from yawbench.foundation.workers import Pool
 from yawbench.vocabulary.roles import ROLES
 
@@ -101,7 +102,6 @@ def build_all(
     report_progress = progress or (lambda name, what: None)
     stale = []
     for name in chosen:
-        remove_draft(out / f"{name}.fmu")
         if not force and _is_current(known[name], out / f"{name}.fmu", root):
             report.current.append(name)
             report_progress(name, "current")
@@ -276,7 +276,6 @@ def bring_up_to_date(
     Raises:
         BuildError: each problem begins with the FMU's name.
     """
-    remove_draft(target)
     try:
         stamp = replace(stamp, key=recipe.key(), tool=TOOL)
         if not force and read_stamp(target) == stamp:
@@ -287,7 +286,7 @@ def bring_up_to_date(
         credits = CREDITS if stamp.is_component else {}
         if stamp.is_component:
             target.parent.mkdir(parents=True, exist_ok=True)
-            with draft_of(target, to_bytes(files, stamp)) as draft:
+            with _draft(target, to_bytes(files, stamp)) as draft:
                 reference = reference_files(draft, *modules)
             files |= {path: text.encode() for path, text in reference.items()}
         files = presented(files, recipe.listing(), role=recipe.role, credits=credits)
@@ -311,9 +310,16 @@ def put(target: Path, content: bytes, *modules: str) -> None:
         BuildError: the FMU is defective; an existing FMU is not changed.
     """
     target.parent.mkdir(parents=True, exist_ok=True)
-    with draft_of(target, content) as draft:
-        problems = defects(draft, *modules)
-        if problems:
+    with _draft(target, content) as draft:
+        if problems := defects(draft, *modules):
             raise BuildError(problems)
-        draft.chmod(0o644)
-        os.replace(draft, target)
+    write_whole(target, content)
+
+
+@contextlib.contextmanager
+def _draft(target: Path, content: bytes) -> Iterator[Path]:
+    """Write the content of an FMU to a temporary folder, to be checked before it replaces the FMU."""
+    with tempfile.TemporaryDirectory(prefix="yawbench-build-") as folder:
+        draft = Path(folder) / target.name
+        draft.write_bytes(content)
+        yield draft

@@ -19,9 +19,9 @@ from xml.etree import ElementTree
 
 from yawbench.foundation.errors import Diagnostic, ModelDescriptionError
 from yawbench.foundation.messages import short
-from yawbench.foundation.safe_files import misplaced
 
 from .fmu import Fmu, UnitDefinition, Value, Variable, element_names
+from .zip_members import misplaced
 
 _ALWAYS = ("EnterInitializationMode", "ExitInitializationMode", "DoStep", "FreeInstance")
 CORE = {

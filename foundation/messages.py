@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import math
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Hashable, Iterable, Sequence
 from itertools import pairwise
 from typing import TypeVar
 
@@ -14,7 +14,10 @@ from yawbench.vocabulary.wheels import WHEELS
 _WHEEL_SUFFIX = re.compile(rf"_({'|'.join(WHEELS)})(?=_true\b|\b)")
 """The wheel in a name, also in that of a sensor's true value (`wheel_speed_fl_true`)."""
 
+_ENDS = tuple(f"_{wheel}" for wheel in WHEELS)
+
 K = TypeVar("K")
+T = TypeVar("T", bound=Hashable)
 
 LISTED = 100
 """Maximum number of names in a list. Chosen: more than any of our FMUs has parameters."""
@@ -97,6 +100,13 @@ def counted(number: int, noun: str, several: str = "") -> str:
     return f"{number} {noun if number == 1 else several or f'{noun}s'}"
 
 
+def in_bytes(size: float) -> str:
+    """Return a number of bytes in words: "1.5 GB", "20 MB", "3 kB"."""
+    if size >= 1e9:
+        return f"{size / 1e9:.1f} GB"
+    return f"{size / 1e6:.0f} MB" if size >= 1e6 else f"{size / 1e3:.0f} kB"
+
+
 RESOLVED, FINEST = 3, 6
 """Digits after the first one of the distance of numbers in a range, and of the smallest of them up to so many
 decimals. Chosen: both read as exact to a thousandth, and no rounding is shown."""
@@ -143,14 +153,7 @@ def _decimals(sizes: Sequence[float]) -> int:
 
 def fold(names: Sequence[str]) -> list[str]:
     """Return the names with every complete group of four wheels replaced by one name with `*`."""
-    present = set(names)
-    folded: dict[str, None] = {}
-    for name in names:
-        stem = name[:-2]
-        per_wheel = name[-2:] in WHEELS and stem.endswith("_")
-        whole = per_wheel and all(stem + wheel in present for wheel in WHEELS)
-        folded[stem + "*" if whole else name] = None
-    return list(folded)
+    return _fold(names, lambda name: f"{name[:-2]}*" if name.endswith(_ENDS) else name)
 
 
 def star(text: str) -> str:
@@ -160,27 +163,19 @@ def star(text: str) -> str:
 
 def fold_sentences(items: Sequence[tuple[K, str]]) -> list[tuple[K, str]]:
     """Return (key, sentence) pairs with sentences that are the same for all four wheels merged into one."""
-    folded: dict[tuple[K, str], None] = {}
-    alike: dict[tuple[K, str], set[str]] = {}
-    for key, text in items:
-        alike.setdefault((key, star(text)), set()).add(text)
-    for key, text in items:
-        whole = len(alike[key, star(text)]) == len(WHEELS)
-        folded[key, star(text) if whole else text] = None
-    return list(folded)
+    return _fold(items, lambda item: (item[0], star(item[1])))
 
 
 def fold_wires(pairs: Sequence[tuple[str, str]]) -> list[tuple[str, str]]:
     """Return (output, input) pairs with those of the four wheels merged into one with `*`."""
-    alike: dict[tuple[str, str], set[tuple[str, str]]] = {}
-    for pair in pairs:
-        alike.setdefault((star(pair[0]), star(pair[1])), set()).add(pair)
-    folded: dict[tuple[str, str], None] = {}
-    for output, name in pairs:
-        whole = alike[star(output), star(name)]
-        if len(whole) == len(WHEELS):
-            one_source = len({source for source, _ in whole}) == 1
-            folded[output if one_source else star(output), star(name)] = None
-        else:
-            folded[output, name] = None
-    return list(folded)
+    from_one = _fold(pairs, lambda pair: (pair[0], star(pair[1])))
+    return _fold(from_one, lambda pair: (star(pair[0]), star(pair[1])))
+
+
+def _fold(items: Sequence[T], starred: Callable[[T], T]) -> list[T]:
+    """Return the items once each; those that are the same for all four wheels, `starred`, become one."""
+    alike: dict[T, set[T]] = {}
+    for item in items:
+        alike.setdefault(starred(item), set()).add(item)
+    whole = {item for item, group in alike.items() if len(group) == len(WHEELS)}
+    return [*dict.fromkeys(starred(item) if starred(item) in whole else item for item in items)]

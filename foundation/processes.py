@@ -30,7 +30,6 @@ import sys
 import threading
 import time
 import traceback
-import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import fields
 from functools import partial
@@ -38,7 +37,7 @@ from importlib import import_module
 from multiprocessing.connection import Connection
 from typing import Any, ClassVar
 
-from .errors import RecordWarning, hide_library_warnings
+from .errors import hide_library_warnings
 from .sent_once import SentOnce
 
 GRACE = 5.0
@@ -315,7 +314,6 @@ def _become(request: Request, shared: Sequence[int]) -> None:
     os.environ.update(environment)
     with contextlib.suppress(OSError):
         os.chdir(folder)
-    warnings.filterwarnings("ignore", category=RecordWarning)  # the parent warns
     hide_library_warnings()
     _answer_calls(Channel(commands, answers))
 

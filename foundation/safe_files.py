@@ -16,14 +16,13 @@ import contextlib
 import errno
 import functools
 import os
-import re
 import stat
-import zipfile
-from collections.abc import Callable, Iterable, Iterator
-from pathlib import Path, PurePosixPath
+from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import BinaryIO, Concatenate, ParamSpec, TypeVar
 
 from .errors import YawbenchError
+from .messages import in_bytes
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -32,39 +31,13 @@ TEXT = 1_000_000
 """Bytes of a YAML file. Chosen: fifty times the largest of ours; reading them takes five seconds."""
 PACKED = 1_000_000_000
 """Bytes of an archive. Chosen: larger than all FMUs known to us, and it fits into memory."""
-UNPACKED = 1_000_000_000
-"""Bytes of all members of an archive, unpacked. Chosen: as `PACKED`."""
-MEMBERS = 50_000
-"""Members of an archive. Chosen: ten times what a whole Python with numpy has."""
-DEPTH = 100
-"""Nested folders in an archive. Chosen: ten times what a whole Python has; the standard library
-creates and deletes folders by recursion."""
-
-
 NO_FOLLOW = getattr(os, "O_NOFOLLOW", 0)
 """Flag that refuses to open symbolic links; missing on Windows, where `refuse_link` alone has to do."""
 
 
-class TooLargeError(ValueError):
-    """A file is too large to read; the message has the file as its subject ("it is larger than ...")."""
-
-
-class ArchiveError(ValueError):
-    """The members of an archive cannot be taken; the message is a sentence of its own."""
-
-
 def check_regular(path: Path) -> None:
-    """Check that a path is a regular file, so that no reader blocks on a pipe or a device.
-
-    Raises:
-        OSError: the path does not exist, or is a folder.
-        ValueError: it is something else, or not a valid path.
-    """
-    mode = os.stat(path).st_mode
-    if stat.S_ISDIR(mode):
-        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
-    if not stat.S_ISREG(mode):
-        raise ValueError("it is a pipe, a socket or a device, not a file")
+    """Check that a path is a regular file; see `open_regular`."""
+    open_regular(path).close()
 
 
 def refuse_link(path: Path) -> None:
@@ -88,16 +61,18 @@ def open_regular(path: Path, *, follow: bool = True) -> BinaryIO:
         OSError: the file cannot be opened.
         ValueError: it is not a regular file, or not a valid path.
     """
-    check_regular(path)
     flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
     if not follow:
         refuse_link(path)
         flags |= NO_FOLLOW
-    stream = open(os.open(path, flags), "rb")  # noqa: SIM115
-    if not stat.S_ISREG(os.fstat(stream.fileno()).st_mode):  # replaced since the check
-        stream.close()
-        raise ValueError("it is a pipe, a socket or a device, not a file")
-    return stream
+    descriptor = os.open(path, flags)
+    mode = os.fstat(descriptor).st_mode
+    if stat.S_ISREG(mode):
+        return open(descriptor, "rb")
+    os.close(descriptor)
+    if stat.S_ISDIR(mode):
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
+    raise ValueError("it is a pipe, a socket or a device, not a file")
 
 
 def read_bytes(path: Path, *, largest: int, follow: bool = True) -> bytes:
@@ -110,85 +85,13 @@ def read_bytes(path: Path, *, largest: int, follow: bool = True) -> bytes:
 
     Raises:
         OSError: the file cannot be opened or read.
-        ValueError: it is not a regular file, or not a valid path.
-        TooLargeError: it is larger than `largest`.
+        ValueError: it is not a regular file, not a valid path, or larger than `largest`.
     """
     with open_regular(path, follow=follow) as stream:
         size = os.fstat(stream.fileno()).st_size
         if size > largest:
-            raise TooLargeError(f"it is larger than {_in_words(largest)}")
+            raise ValueError(f"it is larger than {in_bytes(largest)}")
         return stream.read(size)  # allocates that much even for a short file, so not `largest`
-
-
-_METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA)
-
-
-def members(archive: zipfile.ZipFile) -> dict[str, zipfile.ZipInfo]:
-    """Return the files of an archive by path: with /, and without the ./ and \\ that some programs write.
-
-    Raises:
-        TooLargeError: too many members, too many bytes, or too deeply nested folders.
-        ArchiveError: a path leads out of the archive or names two things, or a file is encrypted or packed
-            by an unknown method.
-    """
-    _check_size(archive)
-    files: dict[str, zipfile.ZipInfo] = {}
-    for info in archive.infolist():
-        name = info.filename.replace("\\", "/")
-        parts = PurePosixPath(name).parts
-        if name.startswith("/") or ".." in parts or ":" in name or "\0" in name:
-            raise ArchiveError(f"the archive is unsafe: it contains the path {info.filename!r}")
-        if name.endswith("/") or not parts:
-            continue
-        if info.flag_bits & 0x1:
-            raise ArchiveError(f"the archive is encrypted ({info.filename}): pack it without a password")
-        if info.compress_type not in _METHODS:
-            raise ArchiveError(
-                f"{info.filename} is compressed by a method that is not supported, number "
-                f"{info.compress_type}: pack the archive with 'deflate'"
-            )
-        other = files.setdefault("/".join(parts), info)
-        if (other.CRC, other.file_size) != (info.CRC, info.file_size):
-            raise ArchiveError(f"the archive contains {'/'.join(parts)} twice, with different contents")
-    for name in files:
-        if both := next((str(above) for above in PurePosixPath(name).parents if str(above) in files), None):
-            raise ArchiveError(f"the archive contains {both} as a file and as a folder")
-    return files
-
-
-def misplaced(files: Iterable[str], wanted: str) -> str:
-    """Return why an archive with these files lacks the file `wanted` in its first folder."""
-    for name in files:
-        folder, _, last = name.rpartition("/")
-        if last == wanted and folder.split("/")[0] not in ("resources", "extra", "sources"):
-            return (
-                f"{wanted} is in the folder {folder!r} of the archive: pack the content of that folder, not "
-                "the folder"
-            )
-        if name.lower() == wanted.lower():
-            return f"the archive contains {name}, which has to be called {wanted}"
-    return f"the archive contains no {wanted}"
-
-
-def _check_size(archive: zipfile.ZipFile) -> None:
-    """Check the size of an archive by its directory; `zipfile` never reads more than that declares.
-
-    Raises:
-        TooLargeError: too many members, too many bytes, or too deeply nested folders.
-    """
-    infos = archive.infolist()
-    if len(infos) > MEMBERS:
-        raise TooLargeError(f"it contains {len(infos)} files, more than {MEMBERS}")
-    size = sum(info.file_size for info in infos)
-    if size > UNPACKED:
-        raise TooLargeError(f"unpacked it has {_in_words(size)}, more than {_in_words(UNPACKED)}")
-    depth = max((re.sub(r"[/\\\\]+", "/", info.filename).count("/") for info in infos), default=0)
-    if depth > DEPTH:
-        raise TooLargeError(f"it contains {depth} nested folders, more than {DEPTH}")
-
-
-def _in_words(size: int) -> str:
-    return f"{size / 1e9:.3g} GB" if size >= 1e9 else f"{size / 1e6:.3g} MB"
 
 
 @contextlib.contextmanager
@@ -346,44 +249,6 @@ def claim(path: Path, *, wait: bool = False) -> int:
             if os.path.samestat(os.fstat(descriptor), os.lstat(path)):
                 return descriptor
         os.close(descriptor)  # the previous owner of the lock has renamed or removed the file: try again
-
-
-@contextlib.contextmanager
-def draft_of(file: Path, content: bytes) -> Iterator[Path]:
-    """Write `content` to a temporary draft next to `file`, to be checked before it replaces the file.
-
-    Other processes that draft the same file wait. A draft left by a dead process is overwritten.
-    """
-    path = _draft(file)
-    descriptor = claim(path, wait=True)
-    try:
-        os.ftruncate(descriptor, 0)
-        with os.fdopen(os.dup(descriptor), "wb") as draft:
-            draft.write(content)
-            draft.flush()
-            os.fsync(draft.fileno())
-        if fcntl is None:
-            os.close(descriptor)
-        yield path
-    finally:
-        path.unlink(missing_ok=True)
-        if fcntl is not None:
-            os.close(descriptor)
-
-
-def remove_draft(file: Path) -> None:
-    """Remove a draft of a file that a dead process has left."""
-    path = _draft(file)
-    if not path.is_file():
-        return
-    with contextlib.suppress(OSError):
-        descriptor = claim(path)
-        path.unlink(missing_ok=True)
-        os.close(descriptor)
-
-
-def _draft(file: Path) -> Path:
-    return file.with_name(f".{file.name}.draft")
 
 
 def lock_note(folder: Path) -> bytes | None:

@@ -19,7 +19,7 @@ def copy_checkout(folder: Path, parts: tuple[str, ...] = PARTS) -> Path:
 
     Modules that are compiled stay so, which saves every command in the copy from compiling them.
     """
-    forgotten = shutil.ignore_patterns(".*", "*.draft")
+    forgotten = shutil.ignore_patterns(".*")
     for part in parts:
         shutil.copytree(ROOT / part, folder / part, ignore=forgotten, symlinks=True)
     for file in FILES:

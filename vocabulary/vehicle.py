@@ -20,10 +20,6 @@ class VehicleQuantity(NamedTuple):
     mistakes are outside."""
 
 
-DYNAMIC_INDEX = (0.4, 1.6)
-"""Plausible ratios of yaw inertia to mass times the distances of both axles from the centre of mass. Chosen:
-1 for two point masses at the axles; the cars in `scenarios/vehicles` have 0.61 to 1.10."""
-
 CAR: dict[str, VehicleQuantity] = {
     "mass": VehicleQuantity("kg", "Mass m of the car as it drives", True, 1.0, plausible=(300, 5000)),
     "sprung_mass": VehicleQuantity(

@@ -115,8 +115,10 @@ class PythonComponent:
         except ScenarioError as error:
             raise ScenarioError(f"{instance}: {error}", code="controller-invalid") from None
         except Exception as error:  # the user's code may raise anything while its declarations are read
-            text = str(error) if isinstance(error, (TypeError, ValueError)) else arguments.error_text(error)
-            raise ScenarioError(f"{instance}: {_name(program)}: {text}", code="controller-invalid") from error
+            kind = "" if isinstance(error, (TypeError, ValueError)) else f"{type(error).__name__}: "
+            raise ScenarioError(
+                f"{instance}: {_name(program)}: {kind}{error}", code="controller-invalid"
+            ) from error
         name = self.component.fmu_name
         self.path = HOME / instance / f"{quote(label, safe=' ') or name}.fmu"
         digest = hashlib.sha256(self._xml + _parameters.text_of(program)).hexdigest()
@@ -224,7 +226,7 @@ def _component(program: Any, role: str) -> tuple[type[Component], type[Component
 
     The second item is the class for the translator.
     """
-    if arguments.is_a(program, type):
+    if isinstance(program, type):
         if issubclass(program, Component):
             return _reporting(program), program
         raise ScenarioError(
@@ -370,7 +372,7 @@ def _signals(signals: Any, name: str) -> tuple[str | VariableSpec, ...]:
     wanted = "a tuple of names, ('yaw_rate',)"
     declared = arguments.items(signals, name, wanted)
     for k, item in enumerate(declared):
-        if not arguments.is_a(item, VariableSpec):
+        if not isinstance(item, VariableSpec):
             declared[k] = arguments.text(item, f"{name}[{k}]")
     return tuple(declared)
 
@@ -396,8 +398,8 @@ def _numbers(returned: Any, outputs: Sequence[str]) -> tuple[float, ...]:
         return (returned,)
     if returned is None:
         raise TypeError(f"nothing was returned; return {listed(outputs)}")
-    shape = returned.shape if arguments.is_a(returned, np.ndarray, np.generic) else None
-    if len(outputs) == 1 and (shape == () or not arguments.is_a(returned, list, tuple, np.ndarray)):
+    shape = returned.shape if isinstance(returned, (np.ndarray, np.generic)) else None
+    if len(outputs) == 1 and (shape == () or not isinstance(returned, (list, tuple, np.ndarray))):
         values = [returned]
     elif shape is not None and len(shape) != 1:
         raise ValueError(
@@ -415,7 +417,7 @@ def _numbers(returned: Any, outputs: Sequence[str]) -> tuple[float, ...]:
 def _number(value: Any, output: str) -> float:
     """Return an output as a number; the master checks that it is finite."""
     converted = arguments.plain(value)
-    if arguments.is_a(converted, bool) or not arguments.is_a(converted, int, float, Fraction):
+    if isinstance(converted, bool) or not isinstance(converted, (int, float, Fraction)):
         arguments.refuse(output, "a number", value)
     try:
         return float(converted)
@@ -437,7 +439,7 @@ def _fail(self: Any, what: str, t: float) -> None:
 
 def _name(program: Any) -> str:
     """Return the name of a program."""
-    if arguments.is_a(program, functools.partial):
+    if isinstance(program, functools.partial):
         return _name(program.func)
     try:
         name = getattr(program, "__name__", None)

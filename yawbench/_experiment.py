@@ -75,7 +75,7 @@ def experiment(
     changed = base._unswapped(axes)
     for name, levels in axes.items():
         with arguments.as_scenario_errors():
-            labelled = arguments.is_a(levels, Mapping)
+            labelled = isinstance(levels, Mapping)
             if labelled and name not in base._loaded.units:
                 raise TypeError(f"{name}: must be a list of values; only instances have labelled levels")
             pairs = (
@@ -152,10 +152,6 @@ class Experiment:
 
     base: Scenario
     _design: Design
-
-    def __post_init__(self) -> None:
-        arguments.instance(self.base, "base", Scenario, "yawbench.load")
-        arguments.instance(self._design, "design", Design, "yawbench._experiment")
 
     def __len__(self) -> int:
         return len(self._design.cases)
@@ -239,13 +235,6 @@ class Runs:
 
     _findings: ExperimentResult
     runs: list[Run | None] | None = None
-
-    def __post_init__(self) -> None:
-        arguments.instance(self._findings, "findings", ExperimentResult, "Experiment.run")
-        if self.runs is not None and not (
-            type(self.runs) is list and all(run is None or arguments.is_a(run, Run) for run in self.runs)
-        ):
-            arguments.refuse("runs", "a list of runs", self.runs)
 
     @cached_property
     def table(self) -> pd.DataFrame:

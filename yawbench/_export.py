@@ -121,8 +121,8 @@ class _ProgramRecipe(PythonRecipe):
 
 def _recipe(program: Any, known: PythonComponent, name: str, folder: str) -> PythonRecipe:
     """Return the recipe of the first form of a program that gives the same values."""
-    target = program.func if arguments.is_a(program, functools.partial) else program
-    is_class = arguments.is_a(program, type)
+    target = program.func if isinstance(program, functools.partial) else program
+    is_class = isinstance(program, type)
     code = target if is_class or inspect.isfunction(target) else type(target)
     if not (is_class or inspect.isfunction(target) or hasattr(target, "output")):
         raise refuse(f"{type(target).__name__}: give a function, or an object with a method output(t, u)")

@@ -76,13 +76,6 @@ class RecordedRuns:
     folder: Path
     files: Mapping[str, Path]
 
-    def __post_init__(self) -> None:
-        arguments.instance(self.folder, "folder", Path, "pathlib.Path")
-        wanted = "a mapping of names to paths of tables"
-        files = arguments.mapping(self.files, "files", wanted)
-        if not all(arguments.is_a(file, Path) for file in files.values()):
-            arguments.refuse("files", wanted, self.files)
-
     @property
     def table(self) -> pd.DataFrame:
         """The main table, whose `attrs["units"]` holds the units.
@@ -148,7 +141,7 @@ class RecordedRuns:
 
         from .figures import panels as drawing
 
-        wanted = [arguments.text(panel, f"panels[{k}]") for k, panel in enumerate(panels)]
+        wanted = arguments.texts(panels, "panels")
         title = None if title is None else arguments.text(title, "title")
         if not self.runs:
             raise ResultsError(f"{self.folder}: no results were kept", code="results-missing")

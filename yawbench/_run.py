@@ -65,7 +65,7 @@ class Run:
     """
 
     def __init__(self, results: Results) -> None:
-        self.results = arguments.instance(results, "results", Results, "a run; yawbench.open reads folders")
+        self.results = results
 
     @property
     def time(self) -> np.ndarray:
@@ -88,7 +88,7 @@ class Run:
 
         >>> warned = base.set({"speed": 300}).run().diagnostics[0]
         >>> warned.code, warned.location.signal, warned.value
-        ('unit-suspicious', 'driver.target_speed', 300.0)
+        ('value-implausible', 'driver.target_speed', 300.0)
         """
         return self.results.record.all_diagnostics
 
@@ -102,7 +102,7 @@ class Run:
         return self.results.columns[self.results.column(arguments.text(name, "name of a column"))]
 
     def __contains__(self, name: object) -> bool:
-        return arguments.is_a(name, str) and arguments.plain(name) in self.results.columns
+        return isinstance(name, str) and arguments.plain(name) in self.results.columns
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.results.columns)
@@ -224,7 +224,7 @@ class Run:
 
         from .figures import panels as drawing
 
-        wanted = [arguments.text(panel, f"panels[{k}]") for k, panel in enumerate(panels)]
+        wanted = arguments.texts(panels, "panels")
         title = None if title is None else arguments.text(title, "title")
         runs = [LabelledRun(self.title, *filtered_alike([self.results]))]
         drawing.check_panels(runs, wanted, option="panel ")

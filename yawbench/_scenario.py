@@ -79,16 +79,6 @@ class Scenario:
     _programs: Mapping[Path, PythonComponent] = field(default_factory=dict, repr=False)
     """Components in plain Python, by their virtual paths."""
 
-    def __post_init__(self) -> None:
-        if not arguments.is_a(self.path, Path):
-            arguments.refuse("path", "a Path; yawbench.load takes names, too", self.path)
-        if not arguments.is_a(self.changes, tuple) or not all(
-            arguments.is_a(change, Override) for change in self.changes
-        ):
-            arguments.refuse("changes", "changes as `set`, `swap` and `fault` make them", self.changes)
-        if not arguments.is_a(self._programs, dict):
-            arguments.refuse("programs", "programs as `swap` makes them", self._programs)
-
     def swap(
         self, replacements: Mapping[str, ControllerLike] | None = None, /, **instances: ControllerLike
     ) -> Scenario:

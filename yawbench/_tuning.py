@@ -109,7 +109,7 @@ def tune(
 
 
 def _bases(base: Any) -> list[Scenario]:
-    if arguments.is_a(base, Scenario):
+    if isinstance(base, Scenario):
         return [base]
     bases = arguments.items(base, "base", "what yawbench.load returns, or a list of these")
     if not bases:
@@ -119,7 +119,7 @@ def _bases(base: Any) -> list[Scenario]:
 
 def _weights(objective: Any) -> dict[str, float]:
     """Return metric -> weight."""
-    if not arguments.is_a(objective, Mapping):
+    if not isinstance(objective, Mapping):
         return {arguments.text(objective, "objective"): 1.0}
     wanted = "a metric, or a mapping of metrics to weights, {'peak(sideslip)': 1.0}"
     weights = arguments.mapping(objective, "objective", wanted)
@@ -233,10 +233,6 @@ class Tuning:
 
     _design: Design
     _tuned: TunedLaw
-
-    def __post_init__(self) -> None:
-        arguments.instance(self._design, "design", Design, "yawbench.tune")
-        arguments.instance(self._tuned, "tuned", TunedLaw, "yawbench.tune")
 
     @property
     def objective(self) -> float:

@@ -53,7 +53,7 @@ def view(
         ResultsError: there are no or too many runs, or no run has recorded the signal of a panel.
     """
     labelled = _labelled(runs)
-    wanted = [arguments.text(panel, f"panels[{k}]") for k, panel in enumerate(panels)]
+    wanted = arguments.texts(panels, "panels")
     for name in wanted:
         parts = [
             part.strip().removesuffix("_error") for panel in name.split(",") for part in panel.split(" - ")
@@ -74,15 +74,15 @@ def view(
 
 def _labelled(runs: object) -> list[LabelledRun]:
     """Return runs with labels: those of a mapping, else their titles; of equal ones number and overrides."""
-    if arguments.is_a(runs, Run):
+    if isinstance(runs, Run):
         runs = [runs]
-    if arguments.is_a(runs, Mapping):
+    if isinstance(runs, Mapping):
         named = arguments.mapping(runs, "runs", "a mapping of labels to runs")
     else:
         several = arguments.items(runs, "runs", "a run, a list of runs, or a mapping of labels to runs")
-        titles = [run.title if arguments.is_a(run, Run) else "" for run in several]
+        titles = [run.title if isinstance(run, Run) else "" for run in several]
         if len(set(titles)) < len(titles):
-            changes = [run.changes if arguments.is_a(run, Run) else () for run in several]
+            changes = [run.changes if isinstance(run, Run) else () for run in several]
             shared = [change for change in changes[0] if all(change in made for made in changes)]
             own = [changed(change for change in made if change not in shared) for made in changes]
             titles = [f"{k + 1}: {own[k] or title}" for k, title in enumerate(titles)]
@@ -109,15 +109,6 @@ class View:
     labels: tuple[str, ...]
     html: str
     height: int = HEIGHT
-
-    def __post_init__(self) -> None:
-        if not arguments.is_a(self.labels, tuple) or not all(
-            arguments.is_a(label, str) for label in self.labels
-        ):
-            arguments.refuse("labels", "labels as `view` makes them", self.labels)
-        if not arguments.is_a(self.html, str):
-            arguments.refuse("html", "a page as `view` makes it", self.html)
-        arguments.count(self.height, "height", least=LEAST, most=MOST)
 
     def save(self, file: str | Path) -> Path:
         """Write the page and return its path.

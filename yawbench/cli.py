@@ -21,7 +21,6 @@ from yawbench.foundation import plugins
 from yawbench.foundation.errors import (
     Diagnostic,
     Interrupted,
-    RecordWarning,
     YawbenchError,
     hide_library_warnings,
 )
@@ -146,7 +145,8 @@ def _status(arguments: Sequence[str]) -> int:
         return 2
     try:
         try:
-            with _interruptible(), _warnings_as_notes():
+            with _interruptible(), warnings.catch_warnings():
+                hide_library_warnings()
                 _application(arguments)(arguments)
         except SystemExit as ended:
             return ended.code if isinstance(ended.code, int) else int(ended.code is not None)
@@ -183,25 +183,6 @@ def _status_of_printing(printed: output.Output, status: int) -> int:
         _print_errors([Diagnostic("results-unwritable", error.strerror or str(error))])
         return 1
     return status
-
-
-@contextlib.contextmanager
-def _warnings_as_notes() -> Iterator[None]:
-    """Print this package's warnings as notes, in JSON too; of others, those of users' own files."""
-    with warnings.catch_warnings():
-        hide_library_warnings()
-        warnings.simplefilter("always", RecordWarning)
-        before = warnings.showwarning
-
-        def show(message: Warning | str, category: type[Warning], *where: Any, **more: Any) -> None:
-            if issubclass(category, RecordWarning):
-                output.note([Diagnostic("results-changed", str(message), "warning")])
-                print(cut(printable(f"note: {message}"), LONGEST_MESSAGE), file=sys.stderr, flush=True)
-            else:
-                before(message, category, *where, **more)
-
-        warnings.showwarning = show
-        yield
 
 
 LONGEST_MESSAGE = 5000

@@ -26,8 +26,9 @@ from yawbench.foundation.interrupts import StopFlag, interrupts
 from yawbench.foundation.messages import printable
 
 from ..plan import Plan
-from ..results.freshness import key_of, recorded_variables, run_record, units_of
+from ..results.freshness import key_of
 from ..results.reader import Results
+from ..results.record_of_plan import recorded_variables, run_record, units_of
 from ..results.recorder import MemoryRecorder, Recorder, recorder_of
 from ..results.run_folder import RunStatus
 from ..results.run_record import DiagnosticRecord, EndRecord, ErrorRecord, WarningRecord

@@ -19,7 +19,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from yawbench.foundation.cache import changed_since, has_checksums, warn_of_record
 from yawbench.foundation.errors import ScenarioError
 from yawbench.foundation.messages import cut, hint, listed
 from yawbench.foundation.safe_files import read_bytes, reading, reason
@@ -257,7 +256,7 @@ def _units_beside(path: Path) -> Mapping[str, str]:
     """Return the units of recorded results, from the run record next to them.
 
     Raises:
-        ValueError: the run record was changed after its run, or cannot be read.
+        ValueError: the run record cannot be read.
     """
     if path.stem != "results":
         return {}
@@ -270,11 +269,7 @@ def _units_beside(path: Path) -> Mapping[str, str]:
         raise ValueError(f"the {BESIDE} beside it cannot be read: {reason(error)}") from None
     if not isinstance(record, dict) or record.get("results", "results.csv") != path.name:
         return {}
-    if words := changed_since(record):
-        raise ValueError(f"the {BESIDE} beside it is not what the run has written: {words}")
     units = record.get("units")
-    if isinstance(units, dict) and not has_checksums(record):
-        warn_of_record(f"{beside}: has no checksums; its units are taken as they are")
     return {str(name): str(unit) for name, unit in units.items() if unit} if isinstance(units, dict) else {}
 
 

@@ -87,7 +87,7 @@ class _Sink:
 class ParquetFile:
     """A Parquet file of results (see `file_formats.ResultsSource`)."""
 
-    def __init__(self, path: Path, texts: Sequence[str] | None = None) -> None:
+    def __init__(self, path: Path, texts: Sequence[str] = ()) -> None:
         import pyarrow.parquet as pq
 
         self._file = pq.ParquetFile(path)  # pyarrow must not interpret the names of its folders as partitions
@@ -142,7 +142,7 @@ class MdfFile:
     ROWS = 200_000
     """Rows read at a time; chosen: a column of them takes a few megabytes at most."""
 
-    def __init__(self, path: Path, texts: Sequence[str] | None = None) -> None:
+    def __init__(self, path: Path, texts: Sequence[str] = ()) -> None:
         self._path = path
         with self._open() as mdf:
             (group,) = mdf.groups

@@ -17,7 +17,6 @@ from pathlib import Path
 
 import numpy as np
 
-from yawbench.foundation.cache import checksum
 from yawbench.foundation.errors import ResultsError
 from yawbench.foundation.messages import fold, listed, short
 from yawbench.foundation.safe_files import check_regular, reads, reason
@@ -26,7 +25,7 @@ from ..scenario.quantities import conversion, measure_of
 from ..signal_names import SignalName
 from .file_formats import FILES, FORMATS, ResultsSource, load_class
 from .run_folder import PART, RUN_FILE, RunStatus, is_dead, unfinished
-from .run_record import ConnectionRecord, RunRecord, check_record, load_record, warn_if_unchecked
+from .run_record import ConnectionRecord, RunRecord, check_record, load_record
 
 
 @dataclass(frozen=True)
@@ -77,7 +76,6 @@ def _runs_in(folder: Path) -> Iterator[FoundRun]:
         return
     try:
         record = load_record(folder, settled=going is not None)
-        warn_if_unchecked(record, folder)
     except ResultsError as error:
         yield FoundRun(folder, RunStatus.UNREADABLE, RunRecord(), str(error))
         return
@@ -268,7 +266,6 @@ def load_results(
     """
     folder = Path(folder)
     record = load_record(folder)
-    warn_if_unchecked(record, folder)
     name = record.results
     if name not in FILES.values():
         known = listed(FILES.values(), last="or")
@@ -278,7 +275,12 @@ def load_results(
         check_regular(path)
         file = source_of(path, record.texts)
         _check_names(file.names)
-        _check_checksum(path, record)
+        if record.size not in (None, path.stat().st_size):
+            raise ResultsError(
+                f"{path}: was cut off or changed: its run wrote {record.size} bytes (`size` in "
+                f"{RUN_FILE}), here are {path.stat().st_size}; run it again.",
+                code="results-changed",
+            )
         empty = _empty(folder, file.names, record)
         columns = list(dict.fromkeys(only(empty))) if only else file.names[1:]
         blocks = _in_order(file.blocks(["time", *columns]))
@@ -291,19 +293,15 @@ def load_results(
         ) from None
     except (OSError, ValueError) as error:
         raise ResultsError(f"{path}: cannot be read: {reason(error)}") from None
-    if record.status is RunStatus.COMPLETED and not thin and time.size < record.rows:
-        raise ResultsError(
-            f"{path}: contains {time.size} of the {record.rows} rows of its run; run it again."
-        )
     return Results(folder, time, dict(zip(columns, values, strict=True)), empty.units, record)
 
 
-def source_of(path: Path, texts: Sequence[str] | None = None) -> ResultsSource:
+def source_of(path: Path, texts: Sequence[str]) -> ResultsSource:
     """Open a results file for reading.
 
     Args:
         path: path of the file; its name determines the format.
-        texts: columns that hold text, for formats that do not record it; None: guess from the first row.
+        texts: columns that hold text, for formats that do not record it.
 
     Raises:
         OSError, ValueError: it is not a file that a run writes.
@@ -326,19 +324,6 @@ def _empty(folder: Path, names: Sequence[str], record: RunRecord) -> Results:
     """Return results with these columns and no rows."""
     units = {name: record.units.get(name) or "" for name in names}
     return Results(folder, np.empty(0), {name: np.empty(0) for name in names[1:]}, units, record)
-
-
-def _check_checksum(path: Path, record: RunRecord) -> None:
-    """Check a results file against the checksum in its record, if there is one.
-
-    Raises:
-        ValueError: it is a different file, or truncated.
-    """
-    if record.checksum and record.checksum != checksum(path):
-        raise ValueError(
-            f"it is not what its run has written (its checksum in {RUN_FILE} is another); run it again, or "
-            f"remove the checksum if you have changed the file yourself"
-        )
 
 
 def _in_order(blocks: Iterator[list[np.ndarray]]) -> Iterator[list[np.ndarray]]:

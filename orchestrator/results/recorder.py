@@ -10,28 +10,23 @@ from __future__ import annotations
 
 import contextlib
 import csv
-import errno
-import hashlib
 import io
 import os
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from yawbench.fmus.fmu import Value
-from yawbench.foundation.cache import checksum, shown
 from yawbench.foundation.errors import ResultsError
 from yawbench.foundation.safe_files import reason, write_whole
 
 from .file_formats import FORMATS, RESULTS_FILE, check_format, load_class, plain, rows_text
+from .folder_lock import FolderLock
 from .reader import Results
-from .run_folder import PART, RUN_FILE, FolderLock, RunStatus, put_in_place, tidy
-from .run_record import ErrorRecord, RunRecord
+from .run_folder import PART, RUN_FILE, put_in_place, tidy
+from .run_record import RunRecord
 
-FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-"""Numbers of the errors of a disk, or a user's share of it, that is full, and of a limit of a file's size."""
 BLOCK = 512
 """Rows buffered in memory before they are written."""
 
@@ -125,14 +120,15 @@ class Recorder(RowBlock):
         self._lock = FolderLock(folder)
         try:
             tidy(self._home)
-            self._file = self._path.open("xb", buffering=0)  # "x": does not follow a link of that name
+            # "x" does not follow a link of that name; a file that something truncates stays shorter
+            append = lambda name, flags: os.open(name, flags | os.O_APPEND, 0o666)  # noqa: E731
+            self._file = open(self._path, "xb", buffering=0, opener=append)  # noqa: SIM115
         except OSError as error:
             self._lock.release()
             raise ResultsError(
                 f"{folder}: results cannot be written here: {reason(error)}.", code="results-unwritable"
             ) from None
         self._size = 0
-        self._digest: Any = hashlib.sha256()  # None once rows have been cut off
         try:
             self._begin()
         except ResultsError:
@@ -176,65 +172,50 @@ class Recorder(RowBlock):
                 f"{self.folder / self.file}: cannot be written: {reason(error)}.", code="results-unwritable"
             ) from None
         self._size += len(data)
-        if self._digest is not None:
-            self._digest.update(data)
 
     def _cut_back(self, arrived: bytes) -> None:
         """Keep the whole rows of a block that did not fit on the disk."""
         whole = arrived.rfind(b"\n") + 1
         self.written += arrived[:whole].count(b"\n") if self._size else 0
         self._size += whole
-        self._digest = None
         with contextlib.suppress(OSError):
             self._file.truncate(self._size)
 
     def finish(self, record: RunRecord) -> None:
         """Complete and write the run record, flush everything to disk, and give both files their final names.
 
-        On a full disk the last rows are dropped to make room for the record, without which the others are
-        useless; the run is then a failed one. The folder stays locked until `close`.
+        If the disk has no room for the record, the files stay as those of a run that died. The folder stays
+        locked until `close`.
 
         Raises:
-            ResultsError: not every row is in the file. The rows that are are kept as those of a failed run,
-                or if the file was changed by something else, none.
+            ResultsError: not every row is in the file, or the record cannot be written.
         """
-        lost = ""
         try:
             self._complete(record)
             os.fsync(self._file.fileno())
             self._refuse_altered()
-            try:
-                self._write_record(record)
-            except OSError as error:
-                rows = self.written
-                if error.errno not in FULL or not self._make_room(len(record.to_json().encode())):
-                    raise
-                if record.status is RunStatus.COMPLETED:
-                    lost = f"the disk is full, {self.written} of {rows} rows are kept"
-                    record.status, record.error = RunStatus.FAILED, ErrorRecord(message=lost, instance=None)
-                self._write_record(record)
+            self._write_record(record)
             self._file.close()
             self.written_to = self.folder / put_in_place(self._home).relative_to(self._home)
         except ResultsError:
             self.discard()
             raise
         except OSError as error:
-            self.discard()
-            raise self._unwritable(error) from None
-        if lost:
-            raise ResultsError(f"{self.written_to / self.file}: {lost}.", code="results-unwritable")
+            if not (self.rows_stay and self._run_path.exists()):
+                self.discard()
+                raise self._unwritable(error) from None
+            self._file.close()
+            self._lock.release()
+            way_out = f"; make room, then 'yawbench salvage {self.folder}' keeps the rows"
+            raise self._unwritable(error, way_out) from None
 
     def _refuse_altered(self) -> None:
-        """Check that the file has the bytes that were written to it, and under its name.
+        """Check that the file is still there with all that was written to it.
 
         Raises:
-            ResultsError: something else has removed, replaced or changed it.
+            ResultsError: something else has removed, shortened or lengthened it.
         """
-        try:
-            whole = self._path.stat().st_size == self._size and self._checksum() == checksum(self._path)
-        except FileNotFoundError:
-            whole = False
-        if not whole:
+        if not self._path.exists() or self._path.stat().st_size != self._size:
             raise ResultsError(
                 f"{self.folder / self._path.name}: was removed or changed by something else before the run "
                 "had ended, and its rows are lost; run it again.",
@@ -256,36 +237,18 @@ class Recorder(RowBlock):
     def _complete(self, record: RunRecord) -> None:
         """Write the end of the file, if the format has one."""
 
-    def _checksum(self) -> str:
-        return checksum(self._path) if self._digest is None else shown(self._digest)
-
     def _write_record(self, record: RunRecord) -> None:
         """Complete a run record with what only the recorder knows, and write it."""
-        record.rows, record.checksum = self.written, self._checksum()
+        record.rows, record.size = self.written, self._size
         if record.results != self.file:
             record.results = self.file
         record.smallest, record.largest = self.extremes()
         write_whole(self._run_path, record.to_json())
 
-    def _unwritable(self, error: OSError) -> ResultsError:
+    def _unwritable(self, error: OSError, way_out: str = "") -> ResultsError:
         return ResultsError(
-            f"{self.folder}: results cannot be written: {reason(error)}.", code="results-unwritable"
+            f"{self.folder}: results cannot be written: {reason(error)}{way_out}.", code="results-unwritable"
         )
-
-    def _make_room(self, needed: int) -> bool:
-        """Truncate the results by at least one row; return whether that freed any space."""
-        size = self._size - 2 * needed - 2 * 4096
-        if size <= 0:
-            return False
-        with self._path.open("rb") as stream:
-            stream.seek(size)
-            lost = stream.read(self._size - size)
-        whole = lost.find(b"\n") + 1
-        self.written -= lost[whole:].count(b"\n")
-        self._size = size + whole
-        self._digest = None
-        self._file.truncate(self._size)
-        return True
 
     def discard(self) -> None:
         """Remove the temporary files; earlier results stay as they are."""
@@ -408,9 +371,6 @@ class ColumnRecorder(Recorder):
     def _pass_on(self) -> None:
         """Write the buffered columns and clear the buffer."""
         raise NotImplementedError
-
-    def _make_room(self, needed: int) -> bool:
-        return False  # part of a columnar file cannot be read
 
 
 def recorder_of(format: str) -> type[Recorder]:

@@ -24,7 +24,6 @@ from pydantic import (
 from pydantic_core import PydanticKnownError
 from typing_extensions import TypedDict
 
-from yawbench.foundation.cache import KEY, changed_since, warn_of_record, with_checksums
 from yawbench.foundation.errors import Diagnostic, Location, ResultsError, Severity, warnings_in
 from yawbench.foundation.messages import short
 from yawbench.foundation.safe_files import read_bytes, reading, reason
@@ -168,34 +167,6 @@ class DiagnosticRecord(_Part):
         return Diagnostic(self.code, self.message, self.severity, place, number)
 
 
-class FindingRecord(_Part):
-    """A warning in records until 0.2."""
-
-    kind: str = ""
-    place: str | None = None
-    value: float | NotFinite | None = None
-    time: float | None = None
-    says: str = ""
-
-    @property
-    def diagnostic(self) -> Diagnostic:
-        """The warning in today's form."""
-        where = Location(signal=self.place, time=self.time)
-        number = None if self.value is None else float(self.value)
-        return Diagnostic(EARLIER.get(self.kind, self.kind), self.says, "warning", where, number)
-
-
-EARLIER = {
-    "spin": "car-spins", "wheel lift": "wheel-lifts", "roll over": "car-rolls-over",
-    "backwards": "car-rolls-backwards", "speed": "speed-implausible", "range": "range-left",
-    "steer angle": "steer-angle-implausible", "grip": "acceleration-implausible",
-    "no car": "value-implausible", "no step": "instance-never-steps", "another tyre": "tyre-mismatch",
-    "another radius": "wheel-radius-mismatch", "two values": "values-differ",
-    "default car": "vehicle-incomplete", "slip": "unit-suspicious",
-}  # fmt: skip
-"""Kind of a warning in records and journals until 0.2 -> its code."""
-
-
 class WarningRecord(_Part):
     """A message of an instance that did not end the run, with its time [s] and FMI status."""
 
@@ -278,7 +249,7 @@ class RunRecord(_Part):
     ended: EndRecord | None = None
     evaluation_order: list[str] = []
     units: dict[str, str | None] = {}  # units of time and of the columns
-    texts: list[str] | None = None  # columns that hold text
+    texts: list[str] = []  # columns that hold text
     fmus: dict[str, FmuRecord] = {}
     sources: list[SourceRecord] = []  # of values of parameters and constants, each once
     changes: list[OverrideRecord] = []
@@ -286,18 +257,15 @@ class RunRecord(_Part):
     faults: list[FaultRecord] = []
     diagnostics: list[DiagnosticRecord] = []
     scenario: RecordedScenario = {}
-    notes: list[str] = []  # until 0.2
     versions: dict[str, str] = {}
     warnings: list[WarningRecord] = []
     more_warnings: NonNegativeInt = 0
     units_freed: bool = False
     loop: str = ""  # that made the steps: "compiled", or "Python: " and why
-    findings: list[FindingRecord] = []  # until 0.2
     results: str = RESULTS_FILE  # name of the file
-    checksum: str = ""  # of that file
+    size: int | None = None  # of that file [bytes]
     smallest: Mapping[str, float | NotFinite] = {}
     largest: Mapping[str, float | NotFinite] = {}
-    checksums: dict[str, str] = {}  # of the keys of the record itself; see `foundation.cache`
 
     @property
     def overrides(self) -> tuple[Override, ...]:
@@ -321,13 +289,12 @@ class RunRecord(_Part):
 
     @property
     def all_diagnostics(self) -> tuple[Diagnostic, ...]:
-        """The diagnostics, also those of a record of an earlier version."""
-        warned = {record.says for record in self.findings}
-        return (
-            *(record.diagnostic for record in self.diagnostics),
-            *(Diagnostic("earlier-note", text, "info") for text in self.notes if text not in warned),
-            *(record.diagnostic for record in self.findings),
-        )
+        """The diagnostics of the run."""
+        diagnostics = tuple(record.diagnostic for record in self.diagnostics)
+        if (self.model_extra or {}).get("findings"):
+            says = f"a run of version 0.2, which warns: see 'findings' in {RUN_FILE}"
+            return (*diagnostics, Diagnostic("earlier-warnings", says, "warning"))
+        return diagnostics
 
     @property
     def course_warnings(self) -> tuple[Diagnostic, ...]:
@@ -341,17 +308,13 @@ class RunRecord(_Part):
         """The path of the scenario file."""
         return str(self.scenario.get("file") or "")
 
-    @property
-    def has_checksums(self) -> bool:
-        """Whether the record carries checksums; those of earlier versions do not."""
-        return "checksums" in self.model_fields_set
-
     def content(self) -> dict[str, Any]:
         """Return the content of run.json, as JSON represents it: non-finite numbers become text."""
-        return with_checksums(_plain(self.model_dump(by_alias=True, exclude_unset=True)))
+        content: dict[str, Any] = _plain(self.model_dump(by_alias=True, exclude_unset=True))
+        return content
 
     def to_json(self) -> str:
-        """Return the text of run.json, with its checksums."""
+        """Return the text of run.json."""
         return json.dumps(self.content(), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
 
@@ -398,29 +361,14 @@ def load_record(folder: Path, *, settled: bool = False) -> RunRecord:
         return check_record(run, file)
 
 
-def warn_if_unchecked(record: RunRecord, folder: Path) -> None:
-    """Warn the user of a record without checksums."""
-    if not record.has_checksums:
-        warn_of_record(
-            f"{folder / RUN_FILE}: has no checksums: it is of an earlier version or was changed; "
-            "its units and names are taken as they are"
-        )
-
-
 def check_record(run: Any, file: Path) -> RunRecord:
     """Return the record with this content, after validating it.
 
     Raises:
-        ResultsError: it was changed, or something in it is not what a run writes.
+        ResultsError: something in it is not what a run writes.
     """
     if not isinstance(run, dict):
         raise ResultsError(f"{file}: is not the record of a run.")
-    if words := changed_since(run):
-        raise ResultsError(
-            f"{file}: is not what its run has written: {words}; run it again, or remove "
-            f"{KEY!r} if you have changed the file yourself.",
-            code="results-changed",
-        )
     try:
         return RunRecord.model_validate(run)
     except ValidationError as errors:

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
 
-from yawbench.foundation.cache import KEY, checksum
 from yawbench.foundation.errors import ResultsError
 from yawbench.foundation.safe_files import open_own, reason, write_whole
 
 from .file_formats import FILES, RESULTS_FILE, CsvFile
+from .folder_lock import FolderLock
 from .run_folder import (
     PART,
     RUN_FILE,
-    FolderLock,
     RunStatus,
     is_dead,
     is_final,
@@ -51,16 +51,16 @@ def salvage(folder: Path) -> tuple[Path, int]:
         if is_final(folder):
             rows = record.get("rows")
             return put_in_place(folder), rows if isinstance(rows, int) else 0
-        rows = _keep_whole_rows(path) if is_regular(path) else 0
+        part = folder / f"{RUN_FILE}{PART}"
+        rows = _keep_whole_rows(path, check_record(record, part).texts) if is_regular(path) else 0
         if rows:
             ended = {
                 "status": RunStatus.DIED.value,
                 "rows": rows,
-                "checksum": checksum(path),
+                "size": path.stat().st_size,
                 "error": {"message": WHY},
             }
-            known = {name: value for name, value in record.items() if name not in ("results", KEY)}
-            part = folder / f"{RUN_FILE}{PART}"
+            known = {name: value for name, value in record.items() if name != "results"}
             write_whole(part, check_record(known | ended, part).to_json())
             return put_in_place(folder), rows
         tidy(folder)
@@ -75,7 +75,7 @@ def salvage(folder: Path) -> tuple[Path, int]:
         lock.release()
 
 
-def _keep_whole_rows(path: Path) -> int:
+def _keep_whole_rows(path: Path, texts: Sequence[str]) -> int:
     """Truncate the file after the last complete row; return the number of rows."""
     end = 0
     with os.fdopen(open_own(path, os.O_RDWR), "r+b") as stream:
@@ -85,7 +85,7 @@ def _keep_whole_rows(path: Path) -> int:
                 end = position + block.rfind(b"\n") + 1
             position += len(block)
         stream.truncate(end)
-    return sum(len(time) for (time,) in CsvFile(path).blocks(["time"])) if end else 0
+    return sum(len(time) for (time,) in CsvFile(path, texts).blocks(["time"])) if end else 0
 
 
 def lost_format(folder: Path) -> str | None:

@@ -29,17 +29,10 @@ from lxml import etree
 from lxml.etree import _Element
 
 from yawbench.fmus.fmu import Causality, UnitDefinition, element_names
+from yawbench.fmus.zip_members import ArchiveError, members, misplaced
 from yawbench.foundation.errors import Diagnostic, Location
 from yawbench.foundation.messages import listed, short
-from yawbench.foundation.safe_files import (
-    PACKED,
-    ArchiveError,
-    TooLargeError,
-    members,
-    misplaced,
-    read_bytes,
-    reason,
-)
+from yawbench.foundation.safe_files import PACKED, read_bytes, reason
 
 from .quantities import BASE_UNITS, Unit, measure_of
 
@@ -142,7 +135,7 @@ class SspArchive:
         try:
             self._archive = zipfile.ZipFile(io.BytesIO(raw))
             self._members = members(self._archive)
-        except (ArchiveError, TooLargeError) as error:
+        except ArchiveError as error:
             raise SspError(f"cannot read this {what}: {error}", code="file-unreadable") from None
         except _DAMAGE as error:
             raise SspError(f"no {what}, or damaged: {error}") from None

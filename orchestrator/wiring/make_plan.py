@@ -49,10 +49,11 @@ from ..signal_names import SignalName, match
 from .connections import Connector
 from .constants import Constant, Input, constants
 from .context import WiringContext
+from .control_side import exact
 from .faults import faults_of
 from .order import EvaluationOrder, evaluate
 from .parameters import STATIC_LOADS, STIFFNESSES, Parameters
-from .suspicious_values import exact, suspicious_values
+from .suspicious_values import suspicious_values
 
 
 def missing_functions(

@@ -1,13 +1,8 @@
-"""Warnings about suspicious values: conflicting, left over from another car, implausible, or probably typos.
+"""Warnings about suspicious values: implausible, conflicting, left over from another car, or of steps.
 
-Implausible are quantities outside the ranges of `vocabulary.vehicle`: a mass in grams, a wheelbase in mm, a
-yaw inertia that does not fit the mass. Defaults of FMUs are not checked: they are the responsibility of
-their authors.
-
-There is also a note on instances of the control side that use the truth although there is a sensor. The role
-of its source determines what a signal is: an estimator gives estimates, a sensor measurements; a signal from
-elsewhere (the plant, the driver), but not from the control side itself, is the truth, exact and without
-delay, which no real car has.
+Implausible are values outside the ranges of `vocabulary.vehicle` and `PLAUSIBLE`: a mass in grams, a
+wheelbase in mm, an angle in degrees. Defaults of FMUs are not checked: they are the responsibility of their
+authors.
 """
 
 from __future__ import annotations
@@ -23,156 +18,20 @@ from yawbench.fmus.fmu import Value, Variable
 from yawbench.foundation.errors import Diagnostic, Location
 from yawbench.foundation.messages import fold, listed
 from yawbench.vocabulary.roles import without_role
-from yawbench.vocabulary.vehicle import CAR, DYNAMIC_INDEX
+from yawbench.vocabulary.vehicle import CAR
 
-from ..plan import DEFAULT, SENSING, Instance, OriginKind, Wire
+from ..plan import DEFAULT, Instance, OriginKind
 from ..scenario.loader import LoadedScenario
 from ..scenario.quantities import exact_text, meant_unit, number_and_unit
 from .context import FACTS
 from .parameters import STIFFNESSES, known_car
 
-CONTROL = ("reference", "controller", "allocator", "wheel_control", "monitor")
-"""Roles that command the car."""
-TRUTH = "truth"
-
-
-def seen_as(wire: Wire, instances: Iterable[Instance]) -> str:
-    """Return the kind of a wire to the control side: "truth", "late truth", "measurement" or "estimate".
-
-    "" if the source is on the control side itself, or the target is not.
-    """
-    roles = {instance.name: instance.role for instance in instances}
-    if roles[wire.target] not in (*CONTROL, "estimator") or roles[wire.source] in CONTROL:
-        return ""
-    truth = "late truth" if wire.output.endswith("_delayed") else TRUTH
-    return SENSING.get(roles[wire.source], truth)
-
-
-def exact(instances: Sequence[Instance], wires: Iterable[Wire]) -> list[Diagnostic]:
-    """Return a note on signals that the control side gets exactly although there is a sensor.
-
-    Instances that only observe, such as a reference for comparison, may use the truth: they do not affect
-    the car.
-    """
-    wires = list(wires)
-    if not any(instance.role == "sensor" for instance in instances):
-        return []
-    steering = _steering(instances, wires)
-    inputs: dict[tuple[str, str], list[str]] = {}
-    for wire in wires:
-        if wire.target in steering and seen_as(wire, instances) == TRUTH:
-            inputs.setdefault((wire.target, wire.source), []).append(wire.input)
-    parts = [f"{listed(fold(names))} of {to} (from {of})" for (to, of), names in inputs.items()]
-    sentence = f"exact, though there is a sensor: {'; '.join(parts)}"
-    return [Diagnostic("sensor-bypassed", sentence, "info")] if parts else []
-
-
-def _steering(instances: Iterable[Instance], wires: Iterable[Wire]) -> set[str]:
-    """Return the instances that affect, directly or through others, one outside the control side."""
-    inside = {instance.name for instance in instances if instance.role in (*CONTROL, "estimator")}
-    reached = {instance.name for instance in instances} - inside
-    while more := {w.source for w in wires if w.target in reached} - reached:
-        reached |= more
-    return reached
-
-
-INERTIA = ("yaw_inertia", "mass", "cg_to_front_axle", "cg_to_rear_axle")
-"""Parameters that determine the dynamic index."""
-
-
-class _Given(NamedTuple):
-    """A quantity of the car with its value, and where it is given."""
-
-    where: str
-    name: str
-    value: float  # in SI
-    raw: object  # as written
-
-
-def suspicious_car(scenario: LoadedScenario, instances: Mapping[str, Instance]) -> list[Diagnostic]:
-    """Return a warning for every implausible quantity of the car, and for inertias that do not fit."""
-    of_file = suspicious_vehicle(scenario.vehicle_file.parameters)
-    in_file = {(item.name, item.value) for item in _of_file(scenario.vehicle_file.parameters)}
-    own = [item for item in _of_instances(scenario, instances) if (item.name, item.value) not in in_file]
-    return [*of_file, *filter(None, map(_beyond, own)), *_index(instances)]
-
-
-def suspicious_vehicle(parameters: Mapping[str, Value]) -> list[Diagnostic]:
-    """Return a warning for every implausible value of a vehicle file."""
-    return [*filter(None, map(_beyond, _of_file(parameters)))]
-
-
-def _of_file(parameters: Mapping[str, Value]) -> Iterator[_Given]:
-    items = (_quantity(name, raw) for name, raw in parameters.items() if name in CAR)
-    return filter(None, items)
-
-
-@lru_cache(maxsize=10_000, typed=True)
-def _quantity(name: str, raw: Value) -> _Given | None:
-    try:
-        return _Given(f"vehicle.{name}", name, known_car({name: raw}).values[name], raw)
-    except ValueError:  # in a unit that only an FMU defines
-        return None
-
-
-def _of_instances(scenario: LoadedScenario, instances: Mapping[str, Instance]) -> Iterator[_Given]:
-    """Yield the quantities that the scenario or an override gives to single instances."""
-    for instance in instances.values():
-        for name, value in instance.parameters.items():
-            origin = instance.origins.get(name, DEFAULT).kind
-            as_said = instance.fmu.variables[name].unit == CAR[name].unit if name in CAR else False
-            if as_said and origin not in ("default", "vehicle", "derived") and isinstance(value, float):
-                raw = scenario.units[instance.name].parameters.get(name, value)
-                yield _Given(f"{instance.name}.{name}", name, value, raw)
-
-
-def _beyond(item: _Given) -> Diagnostic | None:
-    """Return a warning about a value outside its range, None if it is inside or has no range."""
-    quantity = CAR[item.name]
-    if quantity.plausible is None:
-        return None
-    low, high = quantity.plausible
-    if low <= item.value <= high or item.value == 0.0:
-        return None
-    written = number_and_unit(item.raw) if isinstance(item.raw, str) else None
-    number, unit_written = written or (f"{item.value:.10g}", quantity.unit)
-    likely = meant_unit(
-        float(Fraction(number)), unit_written, quantity.unit, lambda value: low <= value <= high
-    )
-    unit = f" {quantity.unit}" if quantity.unit != "1" else ""
-    says = (
-        f"{item.where}: {item.value:.10g}{unit} is implausible for a car "
-        f"(plausible: {low:g} to {high:g}{unit})" + (f"; did you mean '{number} {likely}'?" if likely else "")
-    )
-    return _warning("value-implausible", item.where, says, item.value)
-
-
-def _index(instances: Mapping[str, Instance]) -> Iterator[Diagnostic]:
-    """Yield a warning about the first instance whose yaw inertia does not fit its mass and wheelbase.
-
-    None if one of the values is implausible by itself, or all are defaults of the FMU.
-    """
-    for instance in instances.values():
-        values = {name: instance.parameter(name) for name in INERTIA if name in instance.fmu.variables}
-        numbers = [value for value in values.values() if isinstance(value, float)]
-        is_set = any(instance.origins.get(name, DEFAULT) != DEFAULT for name in INERTIA)
-        if not is_set or len(numbers) < len(INERTIA):
-            continue
-        items = (_Given("", name, number, number) for name, number in zip(INERTIA, numbers, strict=True))
-        if any(map(_beyond, items)):
-            continue
-        inertia, mass, front, rear = numbers
-        index = inertia / (mass * front * rear)
-        low, high = DYNAMIC_INDEX
-        if not low <= index <= high:
-            says = (
-                f"{instance.name}: the yaw inertia, {inertia:.6g} kg.m2, is {index:.3g} times mass times the "
-                f"distances of both axles from the centre of mass; that of cars is {low:g} to {high:g} times"
-            )
-            yield _warning("value-implausible", f"{instance.name}.yaw_inertia", says, inertia)
-            return
-
-
+PLAUSIBLE = {
+    "friction": (0.0, 2.0),  # chosen: above racing tyres on dry asphalt
+    "m/s": (-70.0, 70.0),  # chosen: above the top speed of nearly all cars
+    "rad": (-4.0 * math.pi, 4.0 * math.pi),  # chosen: two turns of a hand wheel
+}
+"""Fact or unit -> smallest and largest plausible value. A number with its unit, `324 km/h`, is meant."""
 OF_CAR = (*(name for name, quantity in CAR.items() if quantity.needed), *STIFFNESSES, "steering_ratio")
 """Parameters that describe the car in any instance."""
 IN_FACTS = {name for fact in FACTS.values() for name in (*fact.inputs, *fact.parameters)}
@@ -183,12 +42,8 @@ SAME = 1e-9
 """Relative difference of values that count as equal: rounding of a conversion."""
 RADIUS = 0.03
 """Tolerated relative difference of wheel and tyre radius. Chosen: the load changes it by 1 to 2 %."""
-SLIPS = (
-    ("m/s", 70.0, "km/h", 3.6),  # chosen: above the top speed of nearly all cars
-    ("rad", 4 * math.pi, "deg", 180 / math.pi),  # chosen: two turns of a hand wheel
-)
-"""Unit, largest plausible value in it, unit that was probably meant, factor to it."""
-LEAST_SLIP = min(largest for _, largest, *_ in SLIPS)
+STEP_TOLERANCE = 1e-6
+"""Relative difference up to which two steps are the same; chosen: FMUs round theirs to as few digits."""
 
 
 class GivenValue(NamedTuple):
@@ -200,72 +55,132 @@ class GivenValue(NamedTuple):
     origin: OriginKind
     variable: Variable
 
+    @property
+    def signal(self) -> str:
+        """Its name in messages."""
+        return f"{self.instance}.{self.name}"
+
+    @property
+    def shown(self) -> str:
+        """The value with its unit."""
+        unit = f" {self.variable.unit}" if self.variable.unit not in (None, "1") else ""
+        return f"{self.value:.6g}{unit}" if not isinstance(self.value, str) else self.value
+
+
+class _Quantity(NamedTuple):
+    """A value with the range that it should be in."""
+
+    where: str
+    name: str
+    value: float
+    written: object  # in the file or the override
+    unit: str
+    plausible: tuple[float, float] | None
+
 
 def suspicious_values(scenario: LoadedScenario, instances: Mapping[str, Instance]) -> list[Diagnostic]:
     """Return warnings about the values of a scenario's instances."""
     parameters, constants = [*_parameters(instances.values())], [*_constants(instances.values())]
+    of_car = _of_vehicle(scenario.vehicle_file.parameters)
     return [
         *_two_values(instances, parameters, constants),
         *_other_cars(scenario, parameters),
-        *_slips(scenario, parameters, constants),
         *_of_tyres(scenario, instances, parameters),
-        *suspicious_car(scenario, instances),
-        *_idle_units(scenario, instances),
-        *_other_steps(scenario, instances),
+        *_implausible([*of_car, *_of_instances(scenario, [*parameters, *constants])]),
+        *_steps(scenario, instances.values()),
     ]
 
 
-def _idle_units(scenario: LoadedScenario, instances: Mapping[str, Instance]) -> Iterator[Diagnostic]:
-    """Yield a warning for every instance that would take its first step after the end of the run."""
+def suspicious_vehicle(parameters: Mapping[str, Value]) -> list[Diagnostic]:
+    """Return a warning for every implausible value of a vehicle file."""
+    return _implausible(_of_vehicle(parameters))
+
+
+def _implausible(quantities: Iterable[_Quantity]) -> list[Diagnostic]:
+    """Return a warning for every value outside its range, once wherever it is given."""
+    beyond = {
+        (item.name, item.value): item
+        for item in reversed([*quantities])
+        if item.plausible and item.value and not item.plausible[0] <= item.value <= item.plausible[1]
+    }
+    return [*map(_beyond, reversed(beyond.values()))]
+
+
+def _beyond(item: _Quantity) -> Diagnostic:
+    assert item.plausible
+    low, high = item.plausible
+    given = number_and_unit(item.written) if isinstance(item.written, str) else None
+    number, assumed = given or (f"{item.value:.10g}", item.unit)
+    likely = meant_unit(float(Fraction(number)), assumed, item.unit, lambda value: low <= value <= high)
+    unit = f" {item.unit}" if item.unit != "1" else ""
+    says = f"{item.where}: {item.value:.10g}{unit} is implausible (plausible: {low:g} to {high:g}{unit})"
+    guess = f"; did you mean '{number} {likely}'?" if likely else ""
+    return _warning("value-implausible", item.where, f"{says}{guess}", item.value)
+
+
+def _of_vehicle(parameters: Mapping[str, Value]) -> Iterator[_Quantity]:
+    for name, written in parameters.items():
+        if name in CAR and (value := _in_si(name, written)) is not None:
+            yield _Quantity(f"vehicle.{name}", name, value, written, CAR[name].unit, CAR[name].plausible)
+
+
+@lru_cache(maxsize=10_000, typed=True)
+def _in_si(name: str, written: Value) -> float | None:
+    try:
+        return known_car({name: written}).values[name]
+    except ValueError:  # in a unit that only an FMU defines
+        return None
+
+
+def _of_instances(scenario: LoadedScenario, given: Iterable[GivenValue]) -> Iterator[_Quantity]:
+    """Yield the values that the scenario or an override gives to instances."""
+    for item in given:
+        if item.origin in ("default", "vehicle", "derived") or not isinstance(item.value, float):
+            continue
+        name, unit = item.name, item.variable.unit or "1"
+        if name in FACTS["friction"].inputs:
+            name = "friction"
+        written = _written(scenario, item)
+        plausible = PLAUSIBLE.get(name, PLAUSIBLE.get(unit)) if not isinstance(written, str) else None
+        if name in CAR and unit == CAR[name].unit:
+            plausible = CAR[name].plausible
+        yield _Quantity(item.signal, name, item.value, written, unit, plausible)
+
+
+def _written(scenario: LoadedScenario, item: GivenValue) -> object:
+    """Return a value as the scenario, its vehicle file or a fact gives it."""
+    for name, fact in FACTS.items():
+        if item.name in fact.parameters and isinstance(written := getattr(scenario, name), str):
+            return written
+    own = scenario.units[item.instance].parameters.get(item.name)
+    return scenario.vehicle_file.parameters.get(item.name) if own is None else own
+
+
+def _steps(scenario: LoadedScenario, instances: Iterable[Instance]) -> Iterator[Diagnostic]:
+    """Yield a warning for every instance whose step is longer than the run, or not that of its FMU."""
     lasts = scenario.stop_time - scenario.start_time
-    steps = lasts / scenario.step_size
-    for instance in instances.values():
-        if instance.period > steps:
-            step = instance.period * scenario.step_size
+    for instance in instances:
+        signal, fixed = f"{instance.name}.step_size", instance.fmu.fixed_step
+        step = instance.period * scenario.step_size
+        if step > lasts:
             says = (
                 f"{instance.name} never takes a step: its step_size, {float(step):g} s, is longer than the "
                 f"run, {float(lasts):g} s; its outputs keep their initial values"
             )
-            yield _warning("instance-never-steps", f"{instance.name}.step_size", says, float(step))
-
-
-STEP_TOLERANCE = 1e-6
-"""Relative difference up to which two steps are the same; chosen: FMUs round theirs to as few digits."""
-FINEST = 100
-"""Smallest part of the communication step to propose; chosen: a run a hundred times as long helps nobody."""
-
-
-def _other_steps(scenario: LoadedScenario, instances: Mapping[str, Instance]) -> Iterator[Diagnostic]:
-    """Yield a warning for every instance that runs with another step than its FMU declares."""
-    for instance in instances.values():
-        fixed, step = instance.fmu.fixed_step, instance.period * scenario.step_size
+            yield _warning("instance-never-steps", signal, says, float(step))
         if fixed is None:
             continue
         times = round(float(step) / fixed) if instance.fmu.takes_multiples else 1
-        if math.isclose(step, max(times, 1) * fixed, rel_tol=STEP_TOLERANCE):
-            continue
-        what = "an internal step" if instance.fmu.takes_multiples else "a fixed step"
-        says = (
-            f"{instance.name} ({instance.fmu.name}) declares {what} of {exact_text(Fraction(repr(fixed)))} s "
-            f"and runs with one of {exact_text(step)} s, so its results may be wrong; "
-            f"{_with_step(instance, Fraction(repr(fixed)), scenario.step_size)}"
-        )
-        yield _warning("instance-step-differs", f"{instance.name}.step_size", says, float(step))
-
-
-def _with_step(instance: Instance, fixed: Fraction, base: Fraction) -> str:
-    """Return how to give an instance its own step when the communication step is `base`."""
-    own = f"--set {instance.name}.step_size={exact_text(fixed)}"
-    if fixed % base == 0:
-        return f"'{own}' gives it that step"
-    common = Fraction(
-        math.gcd(fixed.numerator * base.denominator, base.numerator * fixed.denominator),
-        fixed.denominator * base.denominator,
-    )
-    if base / common > FINEST:
-        return "it needs a communication step that divides its own"
-    both = f"--set step_size={exact_text(common)}"
-    return f"'{both}{f' {own}' if common != fixed or instance.period > 1 else ''}' gives it that step"
+        if not math.isclose(step, max(times, 1) * fixed, rel_tol=STEP_TOLERANCE):
+            own = exact_text(Fraction(repr(fixed)))
+            base = "" if Fraction(repr(fixed)) % scenario.step_size == 0 else f"--set step_size={own} "
+            says = (
+                f"{instance.name} ({instance.fmu.name}) declares "
+                f"{'an internal' if instance.fmu.takes_multiples else 'a fixed'} step of {own} s and runs "
+                f"with one of {exact_text(step)} s, so its results may be wrong; "
+                f"'{base}--set {signal}={own}' gives it that step"
+            )
+            yield _warning("instance-step-differs", signal, says, float(step))
 
 
 def _of_tyres(
@@ -278,17 +193,18 @@ def _of_tyres(
     law = without_role(tyres[0].fmu.name).removesuffix("_transient")
     for item in parameters:
         if item.name == "tyre" and "pcx1_front" in instances[item.instance].parameters and item.value != law:
-            says = f"{item.instance}.tyre is {item.value}: {tyres[0].name} follows {law}"
-            yield _warning("tyre-mismatch", f"{item.instance}.tyre", says)
-    radii = {str(f.path.name): f.rolling_radius for f in scenario.tyre_files.values() if f.rolling_radius}
-    wheel_radii = [item for item in parameters if item.name == "wheel_radius"]
-    for (file, radius), item in product(radii.items(), wheel_radii):
-        if isinstance(item.value, float) and radius and abs(item.value / radius - 1.0) > RADIUS:
+            says = f"{item.signal} is {item.value}: {tyres[0].name} follows {law}"
+            yield _warning("tyre-mismatch", item.signal, says)
+    for file, item in product(scenario.tyre_files.values(), parameters):
+        radius = file.rolling_radius
+        if item.name != "wheel_radius" or not radius or not isinstance(item.value, float):
+            continue
+        if abs(item.value / radius - 1.0) > RADIUS:
             says = (
-                f"{item.instance}.wheel_radius is {item.value:.4g} m, but the tyres of {file} roll on "
+                f"{item.signal} is {item.value:.4g} m, but the tyres of {file.path.name} roll on "
                 f"{radius:.4g} m at nominal load"
             )
-            yield _warning("wheel-radius-mismatch", f"{item.instance}.wheel_radius", says, item.value)
+            yield _warning("wheel-radius-mismatch", item.signal, says, item.value)
 
 
 def _two_values(
@@ -304,14 +220,11 @@ def _two_values(
     for item in parameters:
         groups.setdefault(item.name, []).append(item)
     for name, items in groups.items():
-        if name in IN_FACTS or all(item.value == items[0].value for item in items):
-            continue
-        if _one_matter(name, items) and _differ(items):
+        if name not in IN_FACTS and _one_matter(name, items) and _differ(items):
             vehicle = f"--set vehicle.{name}=VALUE sets it in all of them without a value of their own"
             yield _values_differ(name, items, vehicle)
     for name, fact in FACTS.items():
-        of_fact = [item for item in parameters if item.name in fact.parameters]
-        items = [item for item in of_fact if fact.counts(instances[item.instance], item.name)]
+        items = [item for item in parameters if fact.counts(instances[item.instance], item.name)]
         items += [item for item in constants if item.name in fact.inputs]
         meant = ({"scenario"}, {"default"}) if fact.inputs else ()  # a road may differ from wheel to wheel
         if _differ(items) and {item.origin for item in items} not in meant:
@@ -322,20 +235,20 @@ def _one_matter(name: str, items: list[GivenValue]) -> bool:
     """Return whether a parameter of several instances should have the same value in all of them."""
     origins = {item.origin for item in items}
     measured_alike = len({item.variable.unit or "1" for item in items}) == 1
-    if not measured_alike or origins == {"scenario"}:
+    if len(items) == 1 or not measured_alike or origins == {"scenario"}:
         return False
-    if origins == {"default"}:
+    if name in OF_CAR or origins == {"default"}:
         return name in OF_CAR
-    return name in OF_CAR or "vehicle" in origins or not _differ(items, start=True)
+    return "vehicle" in origins or not _differ(items, start=True)
 
 
 def _differ(items: list[GivenValue], *, start: bool = False) -> bool:
     """Return whether numeric values differ; `start`: whether the FMUs' start values do."""
     values = [item.variable.start if start else item.value for item in items]
-    if any(isinstance(value, bool) or not isinstance(value, (int, float)) for value in values):
+    numbers = [float(x) for x in values if isinstance(x, (int, float)) and not isinstance(x, bool)]
+    if len(numbers) < max(2, len(values)):
         return False
-    numbers = [float(value) for value in values]  # type: ignore[arg-type]
-    return len(numbers) > 1 and max(numbers) - min(numbers) > SAME * max(map(abs, numbers))
+    return max(numbers) - min(numbers) > SAME * max(map(abs, numbers))
 
 
 def _parameters(instances: Iterable[Instance]) -> Iterator[GivenValue]:
@@ -359,18 +272,13 @@ def _values_differ(name: str, items: list[GivenValue], way_out: str) -> Diagnost
     alike: dict[tuple[float, str], list[GivenValue]] = {}
     for item in items:
         alike.setdefault((float(item.value), item.origin), []).append(item)
-    parts = []
-    for (value, origin), some in alike.items():
-        names = fold([f"{item.instance}.{item.name}" for item in some])
-        parts.append(f"{listed(names)} {_measured(value, some[0].variable)} ({origin})")
-    by_change = (item for item in items if item.origin not in OF_FILES)
-    first = next(by_change, items[0])
+    parts = [
+        f"{listed(fold([item.signal for item in some]))} {some[0].shown} ({origin})"
+        for (_, origin), some in alike.items()
+    ]
+    first = next((item for item in items if item.origin not in OF_FILES), items[0])
     says = f"{name} has two values: {', '.join(parts)}; {way_out}"
-    return _warning("values-differ", f"{first.instance}.{first.name}", says, float(first.value))
-
-
-def _warning(code: str, signal: str, says: str, value: float | None = None) -> Diagnostic:
-    return Diagnostic(code, says, "warning", Location(signal=signal), value)
+    return _warning("values-differ", first.signal, says, float(first.value))
 
 
 def _other_cars(scenario: LoadedScenario, parameters: Sequence[GivenValue]) -> Iterator[Diagnostic]:
@@ -378,48 +286,13 @@ def _other_cars(scenario: LoadedScenario, parameters: Sequence[GivenValue]) -> I
 
     A ratio of 1 is exempt: it means that angles are those of the road wheels.
     """
-    defaults = [
-        item
-        for item in (parameters if scenario.vehicle_file.parameters else ())
-        if item.name in OF_CAR and item.origin == "default" and item.value != 1
-    ]
-    if defaults:
-        parts = [f"{item.instance}.{item.name} {_measured(item.value, item.variable)}" for item in defaults]
-        says = f"not in the vehicle file, so defaults of the FMUs apply: {listed(parts)}"
-        first = defaults[0]
-        yield _warning("vehicle-incomplete", f"{first.instance}.{first.name}", says, float(first.value))
+    of_car = (item for item in parameters if item.name in OF_CAR and item.value != 1)
+    defaults = [item for item in of_car if item.origin == "default"]
+    if defaults and scenario.vehicle_file.parameters:
+        parts = listed(f"{item.signal} {item.shown}" for item in defaults)
+        says = f"not in the vehicle file, so defaults of the FMUs apply: {parts}"
+        yield _warning("vehicle-incomplete", defaults[0].signal, says, float(defaults[0].value))
 
 
-def _slips(
-    scenario: LoadedScenario, parameters: Sequence[GivenValue], constants: Sequence[GivenValue]
-) -> Iterator[Diagnostic]:
-    """Yield a warning for every number that was probably meant in another unit."""
-    for item in parameters:
-        if item.origin == "default" or not isinstance(item.value, float) or abs(item.value) <= LEAST_SLIP:
-            continue
-        spec = scenario.units[item.instance].parameters.get(item.name)
-        raw = scenario.vehicle_file.parameters.get(item.name) if spec is None else spec
-        facts = [getattr(scenario, name) for name, fact in FACTS.items() if item.name in fact.parameters]
-        if any(isinstance(number, str) for number in (raw, *facts)):  # they name their unit
-            continue
-        for unit, largest, meant, factor in SLIPS:
-            if item.variable.unit == unit and abs(item.value) > largest:
-                says = (
-                    f"{item.instance}.{item.name}: {item.value:g} {unit} is "
-                    f"{factor * item.value:.4g} {meant}; did you mean '{item.value:g} {meant}'?"
-                )
-                yield _warning("unit-suspicious", f"{item.instance}.{item.name}", says, item.value)
-    for item in constants:
-        if item.name in FACTS["friction"].inputs and isinstance(item.value, float) and item.value > 2.0:
-            parameter = f"{item.instance}.{item.name}"
-            number = f"{item.value:g}"
-            says = (
-                f"{parameter}: a friction of {number} is implausible for a road; did you mean '{number} %'?"
-            )
-            yield _warning("unit-suspicious", parameter, says, item.value)
-            return
-
-
-def _measured(value: Value, variable: Variable) -> str:
-    unit = variable.unit or "1"
-    return f"{value:.6g}{f' {unit}' if unit != '1' else ''}" if not isinstance(value, str) else value
+def _warning(code: str, signal: str, says: str, value: float | None = None) -> Diagnostic:
+    return Diagnostic(code, says, "warning", Location(signal=signal), value)

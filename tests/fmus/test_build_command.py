@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 
@@ -14,7 +13,6 @@ from tests.refusals import each_mentions, mentions
 from yawbench.commands.build import build
 from yawbench.fmus.build import find_recipes
 from yawbench.foundation.errors import BuildError
-from yawbench.foundation.safe_files import claim
 from yawbench.foundation.workers import Pool
 
 APP = typer.Typer()
@@ -109,18 +107,3 @@ def test_the_builder_is_loaded_only_when_it_is_needed(what):
     script = f"import sys, {what}; print('yawbench.fmus.build' in sys.modules or 'pythonfmu' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert done.stdout == "False\n"
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="needs locks")
-def test_a_build_removes_the_drafts_of_builds_that_were_killed_and_of_no_other(tmp_path):
-    run("controller_off", "driver_sine", "--out", tmp_path)
-    left, used = (tmp_path / f".{name}.fmu.draft" for name in ("controller_off", "driver_sine"))
-    left.write_bytes(b"half a dra")
-    descriptor = claim(used)  # as a build that goes on
-    assert run("controller_off", "driver_sine", "--out", tmp_path).exit_code == 0
-    assert not left.exists()
-    assert used.exists()
-    os.close(descriptor)
-    left.write_bytes(b"half a dra")
-    assert run("controller_off", "driver_sine", "--out", tmp_path, "--force").exit_code == 0
-    assert {file.name for file in tmp_path.iterdir()} == {"controller_off.fmu", "driver_sine.fmu"}

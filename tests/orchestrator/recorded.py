@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from yawbench.foundation.cache import with_checksums
 from yawbench.orchestrator.results.reader import Results
 from yawbench.orchestrator.results.run_record import RunRecord
 
@@ -50,8 +49,8 @@ def noted(made: Results, **fields: Any) -> Results:
 
 
 def record_text(content: dict[str, Any]) -> str:
-    """Return the text of a run.json with any content, and with its checksums."""
-    return json.dumps(with_checksums(content))
+    """Return the text of a run.json with any content."""
+    return json.dumps(content)
 
 
 def run_record(units: dict[str, str], title: str = "Sine at 25 m/s") -> dict[str, Any]:

@@ -91,20 +91,6 @@ def test_show_tells_what_there_is_and_touches_nothing(full, capsys):
     assert sorted(full.rglob("*")) == before
 
 
-def test_verify_deletes_what_is_damaged_and_nothing_else(full, capsys):
-    assert each_mentions(told(capsys, "verify")[1], ("entry",))
-    (launcher,) = full.glob("launcher/*")
-    launcher.write_bytes(b"a laun")
-    (table,) = full.glob("*/fmu/resources/table.txt")
-    table.write_bytes(b"9 2 3")
-    out, err = told(capsys, "verify")
-    assert mentions(out, "0.0 MB", "1 deleted", "unpacked", "deleted")
-    assert err == "damaged: 2\n"
-    assert not launcher.exists()
-    assert not table.exists()
-    assert each_mentions(told(capsys, "verify")[1], ("entry",))
-
-
 def test_clear_deletes_what_is_ours(full, capsys):
     for store in STORES:
         keep(store, "4567", b"an entry")

@@ -16,8 +16,8 @@ from yawbench.foundation.safe_files import LOCK_FILE
 from yawbench.orchestrator.master.simulate import simulate
 from yawbench.orchestrator.results import recorder
 from yawbench.orchestrator.results import run_folder as module
+from yawbench.orchestrator.results.folder_lock import FolderLock, holder_of, writing
 from yawbench.orchestrator.results.reader import found_runs, load_results
-from yawbench.orchestrator.results.run_folder import FolderLock, holder_of, writing
 from yawbench.orchestrator.results.salvage import lost_format, salvage
 from yawbench.studies.tables import runs_table
 
@@ -198,7 +198,7 @@ def test_the_next_run_puts_in_place_what_one_had_ended_with_before(tmp_path, mon
 def test_the_second_command_in_a_folder_is_told_who_is_first(tmp_path, monkeypatch):
     monkeypatch.setattr(sys, "argv", ["yawbench", "study", "my study.yaml"])
     with writing(tmp_path / "out"):
-        assert holder_of(tmp_path / "out").process == os.getpid()
+        assert f"process {os.getpid()} " in holder_of(tmp_path / "out")
         sentence = (
             rf"out: \"yawbench study 'my study.yaml'\" \(process {os.getpid()} on .*, since ..:..:..\) is "
             r"writing here; wait for it, or give another folder with --out\.$"
@@ -211,7 +211,7 @@ def test_the_second_command_in_a_folder_is_told_who_is_first(tmp_path, monkeypat
 @needs_locks
 def test_a_folder_below_one_that_another_process_writes_is_refused(tmp_path):
     holding = (
-        "import sys; from pathlib import Path; from yawbench.orchestrator.results.run_folder import *\n"
+        "import sys; from pathlib import Path; from yawbench.orchestrator.results.folder_lock import *\n"
         + ("with writing(Path(sys.argv[1])): print('held', flush=True); input()")
     )
     command = [sys.executable, "-c", holding, str(tmp_path)]

@@ -7,7 +7,7 @@ import pytest
 from tests.refusals import refused
 from yawbench.foundation.errors import ScenarioError
 from yawbench.orchestrator.plan import Override
-from yawbench.orchestrator.results.run_folder import LONGEST, default_folder
+from yawbench.orchestrator.results.folder_names import LONGEST, default_folder
 
 FILE = Path("scenarios/paper/25mps.yaml")
 

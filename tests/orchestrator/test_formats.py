@@ -47,7 +47,7 @@ def record(folder, rows, name):
     fill(writer, rows)
     units = {k: UNITS.get(k) for k in ("time", *COLUMNS)}
     started = "2024-01-02T03:04:05+00:00"
-    writer.finish(RunRecord(status="completed", title="Sine", started=started, units=units))
+    writer.finish(RunRecord(status="completed", title="Sine", started=started, units=units, texts=["a.s"]))
     writer.close()
     return load_results(folder)
 

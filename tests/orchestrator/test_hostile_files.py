@@ -13,7 +13,7 @@ from tests.refusals import each_mentions, mentions, places_of, refused, texts_of
 from yawbench.cli import main
 from yawbench.commands.check import show
 from yawbench.commands.output import print_tables, say
-from yawbench.foundation import safe_files
+from yawbench.fmus import zip_members
 from yawbench.foundation.errors import Diagnostic, ScenarioError, YawbenchError
 from yawbench.foundation.safe_files import reading
 from yawbench.orchestrator.scenario import yaml_lines
@@ -279,7 +279,7 @@ def test_a_bad_address_in_an_ssp_archive_is_refused_with_its_line() -> None:
 
 
 def test_an_ssp_archive_that_unpacks_without_limit_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(safe_files, "UNPACKED", 1_000_000)
+    monkeypatch.setattr(zip_members, "UNPACKED", 1_000_000)
     with zipfile.ZipFile("a.ssp", "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("SystemStructure.ssd", bytes(3_000_000))
     with refused(ScenarioError, "file-unreadable", names=("a.ssp", "3 MB", "1 MB")):

@@ -15,7 +15,6 @@ from tests.pages.made_up import whole_car
 from yawbench.figures.panels import LabelledRun
 from yawbench.figures.plots import draw
 from yawbench.figures.style import digits_of, save
-from yawbench.foundation.errors import RecordWarning
 from yawbench.metrics.expressions import STANDARD, evaluate_all
 from yawbench.metrics.measures import catalogue
 from yawbench.reports.comparison import divergence
@@ -47,7 +46,6 @@ def silent():
     """Turn warnings of libraries into errors."""
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        warnings.simplefilter("ignore", RecordWarning)
         yield
 
 

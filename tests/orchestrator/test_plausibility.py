@@ -122,16 +122,10 @@ def test_a_run_with_findings_is_marked_in_tables():
     assert remarks([("a", results)]) == ["† a: the car spins"]
 
 
-def test_records_of_earlier_versions_give_diagnostics():
-    spin = {"kind": "spin", "place": "plant.sideslip", "value": "inf", "time": 1.0, "says": "the car spins"}
-    notes = ["the car spins", "stiffnesses are those of the tyres"]
-    record = RunRecord.model_validate({"findings": [spin], "notes": notes})
-    note, warning = record.all_diagnostics
-    assert note.severity == "info"
-    assert mentions(note.message, "stiffnesses", "tyres")
-    where = Location(signal="plant.sideslip", time=1.0)
-    assert warning == Diagnostic("car-spins", "the car spins", "warning", where, math.inf)
-    assert record.course_warnings == (warning,)
+def test_a_record_of_version_0_2_says_where_its_warnings_are():
+    (warning,) = RunRecord.model_validate({"findings": [{"kind": "spin"}], "notes": []}).all_diagnostics
+    assert (warning.code, warning.severity) == ("earlier-warnings", "warning")
+    assert mentions(warning.message, "0.2", "run.json", "findings")
 
 
 def spins(speeds, degrees, sideways=True, units=("rad", "m/s")):

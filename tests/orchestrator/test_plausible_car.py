@@ -15,7 +15,7 @@ from yawbench.orchestrator.scenario.loader import load_scenario
 from yawbench.orchestrator.wiring.make_plan import make_plan
 from yawbench.orchestrator.wiring.parameters import known_car
 from yawbench.orchestrator.wiring.suspicious_values import suspicious_vehicle
-from yawbench.vocabulary.vehicle import CAR, DYNAMIC_INDEX
+from yawbench.vocabulary.vehicle import CAR
 
 from .fake_fmus import Var, make_fmu, out
 
@@ -66,20 +66,17 @@ def test_a_car_that_can_be_has_no_remarks():
 @pytest.mark.parametrize(
     "car, says",
     [
-        ({"mass": 1650000}, "vehicle.mass: 1650000 kg is implausible for a car (plausible: 300 to 5000 kg); "
-         "did you mean '1650000 g'?"),
-        ({"mass": "1650 t"}, "vehicle.mass: 1650000 kg is implausible for a car (plausible: 300 to 5000 kg); "
-         "did you mean '1650 kg'?"),
-        ({"mass": 1.65}, "did you mean '1.65 t'?"),
-        ({"yaw_inertia": 26},
-         "vehicle.yaw_inertia: 26 kg.m2 is implausible for a car (plausible: 150 to 15000 kg.m2)"),
-        ({"wheel_radius": 320}, "did you mean '320 mm'?"),
-        ({"wheelbase": 2750, "cg_to_front_axle": 1200, "cg_to_rear_axle": 1550}, "did you mean '2750 mm'?"),
-        ({"cg_height": 55}, "did you mean '55 cm'?"),
+        ({"mass": 1650000}, ("vehicle.mass", "1650000 kg", "300", "5000 kg", "'1650000 g'")),
+        ({"mass": "1650 t"}, ("vehicle.mass", "1650000 kg", "300", "5000 kg", "'1650 kg'")),
+        ({"mass": 1.65}, ("vehicle.mass", "'1.65 t'")),
+        ({"yaw_inertia": 26}, ("vehicle.yaw_inertia", "26 kg.m2", "150", "15000 kg.m2")),
+        ({"wheel_radius": 320}, ("vehicle.wheel_radius", "'320 mm'")),
+        ({"wheelbase": 2750, "cg_to_front_axle": 1200, "cg_to_rear_axle": 1550}, ("wheelbase", "'2750 mm'")),
+        ({"cg_height": 55}, ("vehicle.cg_height", "'55 cm'")),
     ],
-)  # fmt: skip
+)
 def test_a_quantity_that_no_car_has_is_named_with_the_unit_that_was_probably_meant(car, says):
-    assert sum(says in one for one in remarks(**car)) == 1
+    assert mentions(remarks(**car), *says)
 
 
 def test_what_is_turned_off_is_meant():
@@ -88,14 +85,8 @@ def test_what_is_turned_off_is_meant():
 
 def test_a_value_is_named_once_wherever_it_is_given():
     assert len(remarks("vehicle.mass=1650000")) == 1
-    (own, *others) = [one for one in remarks("plant.mass=1650000") if "implausible for a car" in one]
+    (own,) = remarks("plant.mass=1650000")
     assert own.startswith("plant.mass: ")
-    assert others == []
-
-
-def test_a_yaw_inertia_that_does_not_fit_the_mass_is_named():
-    (says,) = remarks(yaw_inertia=9000)
-    assert mentions(says, "plant", "9000 kg.m2", "2.93", "0.4", "1.6")
 
 
 def test_a_unit_whose_step_is_longer_than_the_run_is_named():
@@ -121,8 +112,6 @@ def test_every_car_of_the_library_is_plausible_with_all_that_follows(file):
     for name, value in known.items():
         low, high = CAR[name].plausible or (value, value)
         assert low <= value <= high, name
-    index = known["yaw_inertia"] / (known["mass"] * known["cg_to_front_axle"] * known["cg_to_rear_axle"])
-    assert DYNAMIC_INDEX[0] <= index <= DYNAMIC_INDEX[1]
 
 
 def test_every_range_holds_what_the_quantity_may_be():

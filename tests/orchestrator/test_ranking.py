@@ -5,10 +5,8 @@ from __future__ import annotations
 import csv
 import json
 import re
-import shutil
 import subprocess
 import sys
-import warnings
 from math import radians
 from pathlib import Path
 
@@ -17,7 +15,7 @@ import pytest
 from tests.commands import status_of
 from tests.refusals import mentions
 from yawbench.figures.style import shown
-from yawbench.foundation.errors import Diagnostic, RecordWarning
+from yawbench.foundation.errors import Diagnostic
 from yawbench.ranking.ranking import EntrySpec, load_ranking
 from yawbench.ranking.ranking_scores import (
     UNHELD,
@@ -265,43 +263,6 @@ def test_what_is_wrong_with_a_ranking_is_said_before_any_run(wrong, options, nam
     assert status_of("rank", file, "--out", tmp_path / "out", *options) in (1, 2)
     assert mentions(capsys.readouterr().err, *names)
     assert not list(tmp_path.rglob("run.json"))
-
-
-def edited_ranking(folder: Path, old: str = "", new: str = ""):
-    for name in ("ranking.yaml", "tuned.yaml"):
-        shutil.copy(GROUND / name, folder)
-    text = (folder / "tuned.yaml").read_text()
-    assert old in text
-    (folder / "tuned.yaml").write_text(text.replace(old, new, 1))
-    return load_ranking(folder / "ranking.yaml")
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "words"),
-    [
-        ("42400.0", "42500.0", "'pid_tuned' was changed since `yawbench tune` wrote it"),
-        ("gains: tuned", "gains: authors", "'pid_tuned' was changed since `yawbench tune` wrote it"),
-        ("  pid_tuned:", "  own:", "'own' was added, 'pid_tuned' was removed since `yawbench tune` wrote it"),
-        ("  '*': sha256:", "  '*': sha256:0", "checksums.* was changed since `yawbench tune` wrote it"),
-    ],
-)
-def test_an_edited_file_of_tuned_entries_is_taken_and_the_edit_said(old, new, words, tmp_path):
-    with pytest.warns(RecordWarning) as told:
-        ranking = edited_ranking(tmp_path, old, new)
-    assert [str(one.message) for one in told] == [f"{tmp_path / 'tuned.yaml'}: {words}"]
-    assert ranking.edited == (str(told[0].message),)  # the page shows it, too
-
-
-def test_tuned_entries_without_checksums_are_said_to_be_taken_as_they_are(tmp_path):
-    whole = (GROUND / "tuned.yaml").read_text()
-    with pytest.warns(RecordWarning, match="checksums"):
-        edited_ranking(tmp_path, whole[whole.index("checksums:") :])
-
-
-def test_shipped_entries_are_as_they_were_found(tmp_path):
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        assert edited_ranking(tmp_path).edited == ()
 
 
 def test_the_ranking_of_the_proving_ground_is_as_large_as_it_says():

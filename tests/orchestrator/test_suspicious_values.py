@@ -10,8 +10,8 @@ from tests.changed import changed
 from tests.refusals import each_mentions, mentions, refused
 from yawbench.foundation.errors import WiringError, warnings_in
 from yawbench.orchestrator.scenario.loader import load_scenario
+from yawbench.orchestrator.wiring.control_side import seen_as
 from yawbench.orchestrator.wiring.make_plan import make_plan
-from yawbench.orchestrator.wiring.suspicious_values import seen_as
 from yawbench.vocabulary.wheels import WHEELS
 
 from .fake_fmus import Var, make_fmu, out
@@ -186,8 +186,8 @@ def test_another_cars_steering_ratio_is_named():
 @pytest.mark.parametrize(
     ("setting", "names"),
     [
-        ("plant.initial_speed=90", ("plant.initial_speed", "90 m/s", "324 km/h", "'90 km/h'")),
-        ("driver.amplitude=30", ("driver.amplitude", "30 rad", "1719 deg", "'30 deg'")),
+        ("plant.initial_speed=90", ("plant.initial_speed", "90 m/s", "70 m/s", "'90 km/h'")),
+        ("driver.amplitude=30", ("driver.amplitude", "30 rad", "12.5664 rad", "'30 deg'")),
         (
             "friction=65",
             ("reference.friction", "'65 %'"),

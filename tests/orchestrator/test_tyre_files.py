@@ -15,9 +15,10 @@ from tests.refusals import mentions, refused, texts_of
 from yawbench.cli import main
 from yawbench.foundation.errors import ScenarioError, WiringError, warnings_in
 from yawbench.interop.ssp_write import write_ssp
-from yawbench.orchestrator.results.freshness import key_of, run_record
+from yawbench.orchestrator.results.folder_names import default_folder
+from yawbench.orchestrator.results.freshness import key_of
 from yawbench.orchestrator.results.reader import load_results
-from yawbench.orchestrator.results.run_folder import default_folder
+from yawbench.orchestrator.results.record_of_plan import run_record
 from yawbench.orchestrator.scenario.loader import load_scenario
 from yawbench.orchestrator.scenario.overrides import changes_of, read_changes
 from yawbench.orchestrator.signal_names import Target

@@ -12,7 +12,7 @@ from tests.evidence import RECORD
 from tests.refusals import sentence_has
 from tests.studies import judge_all
 from tests.verdicts import FILE, KINDS, page, recorded, rows_of, studies, summary, table_in
-from yawbench.orchestrator.results.run_folder import default_folder
+from yawbench.orchestrator.results.folder_names import default_folder
 from yawbench.studies.journal import FILE as JOURNAL
 from yawbench.studies.load_experiment import load_experiment
 from yawbench.studies.result_tables import FAILS, HOLDS

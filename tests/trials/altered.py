@@ -29,7 +29,6 @@ import tempfile
 import threading
 import time
 import urllib.request
-import warnings
 from collections import Counter
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -45,8 +44,6 @@ from tests.orchestrator.test_batch_commands import STUDY
 from tests.orchestrator.test_fit import FIT, MEASURED
 from tests.orchestrator.test_fit import SCENARIO as OF_FIT
 from yawbench.cli import main as yawbench
-from yawbench.foundation.cache import KEY, with_checksums
-from yawbench.foundation.errors import RecordWarning
 
 from .kills import SWEEP
 
@@ -277,15 +274,11 @@ def altered(file: Path, others: list[Any], r: random.Random) -> bytes:
 
 
 def _alter_record(content: dict[str, Any], others: list[Any], r: random.Random) -> None:
-    own = content.pop(KEY, None)
     part = content
     inner = [key for key in ("scenario", "fmus", "connections", "diagnostics", "models") if content.get(key)]
     if inner and r.random() < 0.6:
         part = content[r.choice(inner)]
     alter(part, others, r)
-    if own is not None and r.random() < 0.9:
-        with contextlib.suppress(TypeError, ValueError):
-            content |= with_checksums(content)
 
 
 # ---- cases ----
@@ -358,7 +351,6 @@ def served(run: Path) -> None:
     from yawbench.bench.server import ResultsServer
     from yawbench.bench.sliders import Bench
 
-    warnings.simplefilter("ignore", RecordWarning)  # the command line makes notes of them
     bench = Bench()
     with ResultsServer(Path("out"), bench) as server:
         threading.Thread(target=server.serve_forever, daemon=True).start()

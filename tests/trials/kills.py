@@ -56,7 +56,7 @@ SAME = ("*.csv", "*.ssp", "*.parquet", "*.fmu", "experiment.json", "entries.yaml
 """Files that are the same to the last byte, whatever happened before; others hold times and versions."""
 MEASURED = "step_time"
 """Prefix of columns of computing time, which no two runs share."""
-LITTER = (PART, NEW, LOCK_FILE, ".tmp", ".draft")
+LITTER = (PART, NEW, LOCK_FILE, ".tmp")
 """Endings of names of files that a command which has ended may not leave."""
 NOISE = ("Traceback", "leaked", "resource_tracker", "yawbench itself")
 """Words that a command that is killed may not print."""

@@ -187,7 +187,7 @@ def _rename(parent: Any, key: str | int) -> None:
 def cases() -> list[Case]:
     """Return all folders."""
     found: list[Case] = []
-    for place in places(whole_record() | {"rows": 1, "checksum": "", "smallest": {"a.b": 0.0}}):
+    for place in places(whole_record() | {"rows": 1, "size": 1, "smallest": {"a.b": 0.0}}):
         shown = ".".join(map(str, place))
         if place[0] == "smallest" and len(place) > 1:
             place = ("smallest", "plant.sideslip")
@@ -296,7 +296,7 @@ def _below(folder: Path, name: str) -> None:
 
 def _own_results(folder: Path, text: str) -> None:
     record = json.loads((folder / "run.json").read_text())
-    del record["checksum"]
+    del record["size"]
     (folder / "run.json").write_text(json.dumps(record))
     (folder / "results.csv").write_text(text)
 

@@ -102,50 +102,38 @@ def report_build(name: str, what: str) -> None:
         say(f"{name}: {what}")
 
 
-Action = Literal["show", "verify", "clear"]
 CacheAction = Annotated[
-    Action,
-    typer.Argument(
-        help="show: list contents and sizes; verify: check every byte and delete damaged entries; "
-        "clear: delete everything.",
-    ),
+    Literal["show", "clear"],
+    typer.Argument(help="show: list contents and sizes; clear: delete everything."),
 ]
 
 
 def cache(action: CacheAction = "show") -> None:
-    """Show, verify or clear the cache.
+    """Show or clear the cache.
 
     Unpacked FMUs, compiled libraries, keys of sources, and FMUs whose own folder cannot be
     written. Deleted entries are made again when needed.
     Nothing is deleted while another command uses the cache.
     """
-    from yawbench.fmus.archive import kept_in
+    from yawbench.fmus.archive import kept_in, size_of
     from yawbench.foundation.cache import alone_in, cache_folders, remove
 
-    damaged, in_use = 0, False
+    in_use = False
     for folder in cache_folders():
         if not os.access(folder, os.R_OK | os.X_OK):
             continue
         print(folder)
-        with contextlib.nullcontext(True) if action == "show" else alone_in(folder) as alone:
+        clears = action == "clear"
+        with alone_in(folder) if clears else contextlib.nullcontext(True) as alone:
             for kind, entries in kept_in(folder).items():
-                size = sum(entry.size for entry in entries)
-                unwanted = [
-                    entry
-                    for entry in entries
-                    if action == "clear" or (action == "verify" and not entry.whole())
-                ]
-                for entry in unwanted if alone else ():
-                    remove(entry.path)
-                damaged += len(unwanted)
-                also = f", {len(unwanted)} {'deleted' if alone else 'kept'}" if unwanted else ""
+                size = sum(map(size_of, entries))
+                for entry in entries if clears and alone else ():
+                    remove(entry)
+                also = f", {len(entries)} {'deleted' if alone else 'kept'}" if clears else ""
                 print(f"  {kind}: {len(entries)}, {size / 1e6:.1f} MB{also}")
-                if unwanted and not alone:
-                    in_use = True
+                in_use = in_use or not alone
         if not alone:
             print(f"{folder}: in use by another command, nothing was deleted", file=sys.stderr)
-    if action == "verify":
-        print(f"damaged: {damaged}" if damaged else "no entry is damaged", file=sys.stderr)
     if in_use:
         raise typer.Exit(1)
 

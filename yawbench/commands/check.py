@@ -71,7 +71,7 @@ def _data_of(plan: Plan) -> dict[str, object]:
     """Return a plan as run.json describes it."""
     from datetime import datetime, timezone
 
-    from yawbench.orchestrator.results.freshness import run_record
+    from yawbench.orchestrator.results.record_of_plan import run_record
     from yawbench.orchestrator.results.run_folder import RunStatus
 
     record = run_record(plan, status=RunStatus.PLANNED, started=datetime.now(timezone.utc)).content()
@@ -263,7 +263,7 @@ def _shown(value: Value | None, measure: str | None) -> str:
 
 def _wire_rows(plan: Plan) -> Iterable[tuple[str, str, str, str]]:
     """Yield source, target, the control side's view of the source (truth, measured, estimated), variables."""
-    from yawbench.orchestrator.wiring.suspicious_values import seen_as
+    from yawbench.orchestrator.wiring.control_side import seen_as
 
     instances = {instance.name: instance.fmu.variables for instance in plan.instances}
     for (source, target), wires in _grouped(((w.source, w.target), w) for w in plan.wires).items():
@@ -289,7 +289,7 @@ def _delayed_rows(plan: Plan) -> Iterable[Sequence[str]]:
 
 
 def _fault_rows(plan: Plan) -> Iterable[Sequence[str]]:
-    from yawbench.orchestrator.results.freshness import faults_of
+    from yawbench.orchestrator.results.record_of_plan import faults_of
 
     for fault in faults_of(plan):
         yield fault.on, fault.fault, ", ".join(fold(fault.at))

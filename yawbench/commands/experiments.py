@@ -220,7 +220,7 @@ def of_files(context: typer.Context, files: Sequence[Path], options: RunOptions)
     """
     import os
 
-    from yawbench.orchestrator.results.run_folder import default_folder, names_of
+    from yawbench.orchestrator.results.folder_names import default_folder, names_of
     from yawbench.studies.load_experiment import load_experiment
     from yawbench.studies.result_tables import all_tables, counts_of, reach, tally_words
 
@@ -365,7 +365,7 @@ def tune(context: typer.Context, file: TuningFile, options: RunOptions, seed: Tu
     """
     from yawbench.figures.style import save
     from yawbench.foundation.safe_files import write_whole
-    from yawbench.orchestrator.results.run_folder import default_folder
+    from yawbench.orchestrator.results.folder_names import default_folder
     from yawbench.reports.page_parts import image_of
     from yawbench.studies.load_experiment import load_experiment
     from yawbench.studies.tables import to_csv

@@ -254,7 +254,7 @@ def hold(context: typer.Context, *folders: Path) -> None:
     Raises:
         ResultsError: another command is writing there, or a folder is not writable.
     """
-    from yawbench.orchestrator.results.run_folder import writing
+    from yawbench.orchestrator.results.folder_lock import writing
 
     context.with_resource(writing(*folders))
     if not shows_bars():

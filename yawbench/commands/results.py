@@ -45,9 +45,9 @@ def recorded(sources: Sequence[Path], options: RunOptions) -> list[Path]:
         ScenarioError: a scenario or an option is invalid.
     """
     from yawbench.fmus.opener import stale_fmus
+    from yawbench.orchestrator.results.folder_names import default_folder
     from yawbench.orchestrator.results.freshness import staleness
     from yawbench.orchestrator.results.measurement_results import is_measurement, segments_of
-    from yawbench.orchestrator.results.run_folder import default_folder
     from yawbench.orchestrator.scenario import loader
     from yawbench.orchestrator.scenario.loader import MEASUREMENT
     from yawbench.planner import Planner
@@ -109,8 +109,8 @@ def labels_of(folders: Sequence[Path], labels: Sequence[str] | None) -> list[str
 
 def folder_of_all(folders: Sequence[Path]) -> Path:
     """Return the folder for figures of all runs: that of a single run, else their common parent."""
+    from yawbench.orchestrator.results.folder_names import below_results
     from yawbench.orchestrator.results.measurement_results import is_measurement
-    from yawbench.orchestrator.results.run_folder import below_results
 
     if not (own := [folder for folder in folders if not is_measurement(folder)]):
         return below_results("measured", folders[0].stem)

@@ -62,7 +62,8 @@ def run(
     from yawbench.orchestrator.master.log import STATUS, WARNING
     from yawbench.orchestrator.master.simulate import simulate
     from yawbench.orchestrator.results.file_formats import size_note
-    from yawbench.orchestrator.results.run_folder import default_folder, refuse_below_others
+    from yawbench.orchestrator.results.folder_lock import refuse_below_others
+    from yawbench.orchestrator.results.folder_names import default_folder
     from yawbench.orchestrator.scenario.overrides import changed, with_changes
 
     if options.out and name:
@@ -196,7 +197,7 @@ def compare(
     Without --out, results go to results/<folder of the scenario>/<its name>-compare. A run that
     fails is reported; the other runs continue.
     """
-    from yawbench.orchestrator.results.run_folder import default_folder
+    from yawbench.orchestrator.results.folder_names import default_folder
     from yawbench.reports.comparison import comparison_facts
     from yawbench.studies.scenario_experiments import comparison, comparison_table
 
@@ -266,7 +267,7 @@ def converge(
     from yawbench.figures.style import save
     from yawbench.foundation.safe_files import write_whole
     from yawbench.orchestrator.recordings.motion import ANGLES, SPEED_SIGNALS
-    from yawbench.orchestrator.results.run_folder import default_folder
+    from yawbench.orchestrator.results.folder_names import default_folder
     from yawbench.reports.page_parts import image_of
     from yawbench.studies.scenario_experiments import (
         columns_of,

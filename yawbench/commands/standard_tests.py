@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -89,7 +88,7 @@ def drive(
     Without --out, results go to results/<folder of the scenario>/<its name>_series. An interrupted series
     is resumed; finished runs are not repeated.
     """
-    from yawbench.orchestrator.results.run_folder import default_folder
+    from yawbench.orchestrator.results.folder_names import default_folder
     from yawbench.orchestrator.scenario import loader
     from yawbench.studies.scenario_experiments import TestDriver
 
@@ -163,10 +162,6 @@ EvaluatedSources = Annotated[
         metavar="RESULTS...",
     ),
 ]
-SignalsOption = Annotated[
-    Path | None,
-    typer.Option("--signals", metavar="FILE", help="Of earlier versions: says what to write instead."),
-]
 SlowSteer = Annotated[
     list[Path] | None,
     typer.Option(
@@ -200,7 +195,6 @@ def evaluate(
     sources: EvaluatedSources,
     slow_steer: SlowSteer = None,
     angle: CharacteristicAngle = None,
-    signals: SignalsOption = None,
     figures: EvaluationFigures = True,
     out: OutFile = None,
 ) -> None:
@@ -211,15 +205,13 @@ def evaluate(
     `yawbench drive`, its runs and its A are taken, and its evaluation is kept: this one goes to a folder
     evaluated in it. Exit status 1 if nothing could be judged.
     """
+    from yawbench.orchestrator.results.folder_names import below_results
     from yawbench.orchestrator.results.measurement_results import load_run
-    from yawbench.orchestrator.results.run_folder import below_results
     from yawbench.proving_ground.trace import trace_of
 
     from .results import distinct, folder_of_all
 
     chosen = TESTS[test]
-    if signals is not None:
-        _refuse_mapping(signals, sources, test)
     known = _angle(angle, slow_steer, chosen)
     driven = {source: found for source in sources if (found := _driven(source, chosen)) is not None}
     places = [
@@ -309,16 +301,6 @@ class EvaluatedRuns:
             save(self.test.draw_series(self.series, str(self.folder)), self.folder / f"{stem}_series")
             count += 1
         return count
-
-
-def _refuse_mapping(mapping: Path, sources: Sequence[Path], test: str) -> None:
-    """Raise ScenarioError with what replaces the option `--signals`."""
-    files = ", ".join(os.path.relpath(source, mapping.parent) for source in sources)
-    raise ScenarioError(
-        f"--signals is replaced by measurement files: add 'files: [{files}]' to {mapping}, put mass and "
-        f"friction below 'vehicle:', and write 'yawbench evaluate {test} {mapping}'",
-        code="option-invalid",
-    )
 
 
 def _runs(source: Path) -> list[Path]:

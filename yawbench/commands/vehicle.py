@@ -61,7 +61,7 @@ def vehicle(
     gradient, body modes, stopping distance; understeer over lateral acceleration; yaw gain, natural
     frequency and damping over speed.
     """
-    from yawbench.orchestrator.results.run_folder import below_results
+    from yawbench.orchestrator.results.folder_names import below_results
     from yawbench.orchestrator.scenario import loader, yaml_lines
     from yawbench.orchestrator.scenario.schema import Vehicle
     from yawbench.orchestrator.scenario.schema_validation import validated
@@ -168,7 +168,7 @@ def tyre(
     longitudinal force over slip at four loads, forces in combined slip at five slip angles, stiffnesses
     and relaxation lengths over load.
     """
-    from yawbench.orchestrator.results.run_folder import below_results
+    from yawbench.orchestrator.results.folder_names import below_results
     from yawbench.tyre_stand import draw_tyre, put_on_stand
 
     stand = put_on_stand(source, friction=friction, fmus=options.fmus, build=options.build)

@@ -70,21 +70,6 @@ class LinearModel:
     time: float
     title: str
 
-    def __post_init__(self) -> None:
-        kinds = {"inputs": self.inputs, "outputs": self.outputs, "states": self.states}
-        u, y, x = (
-            len(arguments.mapping(names, kind, "a mapping of names to units"))
-            for kind, names in kinds.items()
-        )
-        for name, shape in (("A", (x, x)), ("B", (x, u)), ("C", (y, x)), ("D", (y, u))):
-            matrix = getattr(self, name)
-            if not arguments.is_a(matrix, np.ndarray) or matrix.dtype != float or matrix.shape != shape:
-                arguments.refuse(name, f"an array of floats of shape {shape}", matrix)
-        if (dt := arguments.number(self.dt, "dt")) < 0.0:
-            raise ValueError(f"dt: must be 0 or a time above 0 s (got {dt:g})")
-        arguments.number(self.time, "time")
-        arguments.text(self.title, "title", empty=True)
-
     def to_control(self) -> StateSpace:
         """Return the model as a `StateSpace` of python-control, with its names, `_` in place of `.`.
 

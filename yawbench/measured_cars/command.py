@@ -170,7 +170,7 @@ def fit(context: typer.Context, file: FitFile, options: RunOptions) -> None:
     import json
 
     from yawbench.foundation.safe_files import write_whole
-    from yawbench.orchestrator.results.run_folder import default_folder
+    from yawbench.orchestrator.results.folder_names import default_folder
     from yawbench.planner import Planner
     from yawbench.reports.page_parts import save_page
 

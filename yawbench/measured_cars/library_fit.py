@@ -52,9 +52,6 @@ class Fit:
 
     _result: FitResult
 
-    def __post_init__(self) -> None:
-        arguments.instance(self._result, "result", FitResult, "yawbench.fit")
-
     @property
     def verdict(self) -> str:
         """Verdict in words: whether the scenario's car is better than a fitted single-track model."""

@@ -345,8 +345,8 @@ def while_moving(results: Results) -> Results:
 
 def results_to_be(plan: Plan) -> Results:
     """Return results without rows that have the columns which a plan will record."""
-    from yawbench.orchestrator.results.freshness import connections_of, recorded_variables
     from yawbench.orchestrator.results.reader import Results
+    from yawbench.orchestrator.results.record_of_plan import connections_of, recorded_variables
     from yawbench.orchestrator.results.run_record import FmuRecord, RunRecord
 
     variables = recorded_variables(plan)

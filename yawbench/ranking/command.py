@@ -73,7 +73,7 @@ def rank(
     Runs already made from the same scenario, FMUs and program version are not repeated, so an interrupted
     ranking is resumed. Entries with missing runs are not ranked.
     """
-    from yawbench.orchestrator.results.run_folder import default_folder
+    from yawbench.orchestrator.results.folder_names import default_folder
     from yawbench.orchestrator.scenario import yaml_lines
     from yawbench.reports.page_parts import PAGE
     from yawbench.studies.tables import records_in
@@ -130,7 +130,7 @@ def _rank_by_threats(
 ) -> None:
     """Search the levels that entries survive; write tables and page."""
     from yawbench.foundation.safe_files import write_whole
-    from yawbench.orchestrator.results.run_folder import default_folder
+    from yawbench.orchestrator.results.folder_names import default_folder
     from yawbench.reports.page_parts import PAGE, save_page
     from yawbench.studies.tables import records_in, to_csv
 

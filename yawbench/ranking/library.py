@@ -19,7 +19,7 @@ from yawbench._scenario import fmu_of
 from yawbench.components.fmi.component import Component
 from yawbench.foundation.errors import ScenarioError
 from yawbench.foundation.messages import hint
-from yawbench.orchestrator.results.run_folder import writing
+from yawbench.orchestrator.results.folder_lock import writing
 from yawbench.orchestrator.scenario import loader
 from yawbench.studies.executor import Executor
 from yawbench.studies.jobs import Job, OnOutcome, Outcome, run_job
@@ -120,7 +120,7 @@ def _entries(controller: Any, name: str) -> tuple[dict[str, EntrySpec], dict[Pat
     if controller is None:
         return entries, programs
     named = {name: controller}
-    if arguments.is_a(controller, Mapping):
+    if isinstance(controller, Mapping):
         named = arguments.mapping(controller, "controller", "a mapping of names to controllers")
         if name:
             raise ScenarioError(
@@ -140,7 +140,7 @@ def _entry(controller: Any, name: str) -> tuple[str, EntrySpec, PythonComponent 
         if not (name or Path(fmu).stem):
             raise ScenarioError(f"controller: {fmu!r} is not the name of an FMU", code="controller-invalid")
         return name or Path(fmu).stem, _spec(name or Path(fmu).stem, fmu), None
-    if arguments.is_a(controller, type) and not issubclass(controller, Component):
+    if isinstance(controller, type) and not issubclass(controller, Component):
         controller = _object_of(controller)
     program = PythonComponent(controller, instance=CONTROLLER, role=CONTROLLER, label=name)
     words = name or program.path.stem
@@ -171,9 +171,6 @@ class Ranking:
     """
 
     _ranked: RankingResult
-
-    def __post_init__(self) -> None:
-        arguments.instance(self._ranked, "ranked", RankingResult, "yawbench.rank")
 
     @cached_property
     def table(self) -> pd.DataFrame:

@@ -35,7 +35,6 @@ from typing import Any, Literal
 from pydantic import ConfigDict, Field, field_validator, model_validator
 
 from yawbench.fmus.fmu import is_path
-from yawbench.foundation.cache import warn_of_record, what_changed
 from yawbench.foundation.errors import ResultsError, ScenarioError
 from yawbench.foundation.messages import hint
 from yawbench.foundation.safe_files import reads
@@ -113,25 +112,9 @@ class EntrySpec(StrictModel):
 
 
 class EntriesSpec(StrictModel):
-    """A file of entries only: written by hand, or with checksums by `yawbench tune`."""
+    """A file of entries only: written by hand, or by `yawbench tune`."""
 
     entries: dict[str, EntrySpec] = Field(min_length=1, description="Name -> controller")
-    checksums: dict[str, str] = Field({}, description="Of entries that `yawbench tune` has written")
-
-    @property
-    def content(self) -> dict[str, Any]:
-        """The entries as plain data, which the checksums are of."""
-        return {name: entry.model_dump(exclude_defaults=True) for name, entry in self.entries.items()}
-
-    @property
-    def edited(self) -> str:
-        """Note on edits since `yawbench tune` wrote the file; "" if there are none."""
-        if self.checksums:
-            words = what_changed(self.content, self.checksums)
-            return f"{words} since `yawbench tune` wrote it" if words else ""
-        if any(entry.gains == "tuned" for entry in self.entries.values()):
-            return "has no checksums, so its tuned gains are taken as they are"
-        return ""
 
 
 class RankingSpec(StrictModel):
@@ -193,7 +176,6 @@ class LoadedRanking(LoadedFile):
     entries: dict[str, tuple[EntrySpec, Path]]  # name -> controller, base folder of its path
     quick: bool = False  # only the last amplitude, and only quick conditions
     chosen: tuple[str, ...] = ()  # selected conditions; empty: all
-    edited: tuple[str, ...] = ()  # files edited since `yawbench tune` wrote them
 
     @cached_property
     def conditions(self) -> dict[str, ConditionSpec]:
@@ -265,13 +247,9 @@ def load_ranking(
     path = Path(path)
     spec = validated(RankingSpec, yaml_lines.read(path, what="ranking file"))
     entries = {name: (entry, path.parent) for name, entry in spec.entries.items()}
-    edited: list[str] = []
     for name in spec.more_entries:
         file = path.parent / name
         listed = validated(EntriesSpec, yaml_lines.read(file, what="file of entries"))
-        if words := listed.edited:
-            edited.append(f"{file}: {words}")
-            warn_of_record(edited[-1])
         for key, entry in listed.entries.items():
             if key in entries:
                 raise ScenarioError(
@@ -290,7 +268,7 @@ def load_ranking(
                 f"{path}: there is no condition {name!r}{hint(name, spec.conditions, lead='known')}",
                 code="condition-unknown",
             )
-    return LoadedRanking(path, spec, entries, quick, tuple(chosen), tuple(edited))
+    return LoadedRanking(path, spec, entries, quick, tuple(chosen))
 
 
 def angle_experiment(

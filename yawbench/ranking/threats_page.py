@@ -428,7 +428,7 @@ def threats_page(result: ThreatResult, table: ScoreTable, folder: Path, command:
         "threats.html.j2",
         title=threats.spec.title,
         source=threats.spec.source,
-        notes=[*threats.spec.notes, *threats.ranking.edited],
+        notes=threats.spec.notes,
         matrix=Path(os.path.relpath(matrix, folder)).as_posix() if matrix.is_file() else "",
         quick=threats.quick,
         answer=answer(result, table),

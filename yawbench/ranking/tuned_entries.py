@@ -7,12 +7,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from yawbench.foundation.cache import checksums_of
 from yawbench.foundation.safe_files import write_whole
 from yawbench.studies.experiment import LoadedExperiment
 from yawbench.studies.tuning import TunedLaw, changes_of, tuning_of
-
-from .ranking import EntriesSpec
 
 ENTRIES = "entries.yaml"
 """File in the results folder with the tuned laws as entries of a ranking."""
@@ -47,13 +44,12 @@ def entries_of(experiment: LoadedExperiment, tuned_laws: Sequence[TunedLaw]) -> 
 
 
 def entries_text(entries: dict[str, dict[str, Any]], command: str) -> str:
-    """Return tuned entries as the text of a YAML file with checksums."""
+    """Return tuned entries as the text of a YAML file."""
     from io import StringIO
 
     from ruamel.yaml import YAML
 
     yaml: Any = YAML(typ="safe", pure=True)
     yaml.default_flow_style, yaml.sort_base_mapping_type_on_output, yaml.width = False, False, 110
-    known = checksums_of(EntriesSpec.model_validate({"entries": entries}).content)
-    yaml.dump({"entries": entries, "checksums": known}, stream := StringIO())
+    yaml.dump({"entries": entries}, stream := StringIO())
     return f"# Written by: {command}\n{stream.getvalue()}"

@@ -41,8 +41,8 @@ from yawbench.orchestrator.plan import (
     Plan,
     ValueSource,
 )
-from yawbench.orchestrator.results.freshness import versions
 from yawbench.orchestrator.results.reader import Results
+from yawbench.orchestrator.results.record_of_plan import versions
 from yawbench.orchestrator.results.run_record import NOT_RECORDED, RunRecord
 from yawbench.studies.result_tables import FAILS, HOLDS, NOT_JUDGED, SENSITIVE, UNDECIDED
 from yawbench.studies.tables import Table

@@ -16,10 +16,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 from yawbench.foundation.errors import YawbenchError
-from yawbench.foundation.messages import counted
+from yawbench.foundation.messages import counted, in_bytes
 from yawbench.orchestrator.master.simulate import simulate
 from yawbench.orchestrator.plan import Plan
-from yawbench.orchestrator.results.file_formats import expected_size, in_bytes
+from yawbench.orchestrator.results.file_formats import expected_size
 from yawbench.orchestrator.results.run_folder import RUN_FILE
 
 from .axes import VariantSpec

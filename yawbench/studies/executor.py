@@ -19,12 +19,10 @@ from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
 from yawbench.foundation import plugins
-from yawbench.foundation.cache import warn_of_record
 from yawbench.foundation.errors import ResultsError, ScenarioError
 from yawbench.foundation.workers import Pool
-from yawbench.metrics.expressions import metric, results_to_be, unit_in
 from yawbench.orchestrator.plan import Plan
-from yawbench.orchestrator.results.freshness import altered, staleness
+from yawbench.orchestrator.results.freshness import staleness
 from yawbench.orchestrator.results.run_folder import RUN_FILE
 from yawbench.planner import Planner
 
@@ -297,27 +295,11 @@ def left_to_do(
             made = job.plan is not None and staleness(job.plan, job.out) is None
         else:
             record = records.get(job.key)
-            if record is not None and (words := _other_unit(job, record)):
-                warn_of_record(f"{job.label} will be repeated: {words}")
-                record = None
             made = record is not None and not (job.keep and record.ok and isinstance(read_back(job.out), str))
         if made:
             continue
         left.append(number)
-        if words := altered(job.out):
-            warn_of_record(f"{job.label} will be repeated: {words}")
     return OnDemand(left, jobs.__getitem__), len(known) - len(left)
-
-
-def _other_unit(job: Job, record: MeasuredRun) -> str:
-    """Describe a metric that was recorded in another unit than the plan's; "" if there is none."""
-    assert job.plan is not None
-    results = results_to_be(job.plan)
-    for key, name, _ in job.metrics:
-        value, unit = record.values.get(key), unit_in(results, metric(name))
-        if value is not None and unit not in (None, value[1]):
-            return f"{key} is stored in {value[1]}, but measured in {unit}"
-    return ""
 
 
 def finish(

@@ -1,8 +1,7 @@
 """Journal of finished runs that keep no results: one JSON line per run, appended as it ends.
 
-Each line is synced to disk before the next run is counted. On resuming, a line truncated by a kill is
-dropped; a line with wrong checksums or types is dropped with a warning, and its run is executed again. The
-caller must have the folder locked.
+Each line is synced to disk before the next run is counted. On resuming, a line truncated by a kill or
+damaged is dropped, and its run is executed again. The caller must have the folder locked.
 """
 
 from __future__ import annotations
@@ -14,52 +13,29 @@ from array import array
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, NoReturn
+from typing import Annotated, Any, ClassVar
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, StrictFloat
 
-from yawbench.foundation.cache import KEY, changed_since, has_checksums, warn_of_record, with_checksums
 from yawbench.foundation.errors import Diagnostic, ResultsError
-from yawbench.foundation.messages import counted
-from yawbench.foundation.safe_files import open_own, reason, write_whole
-from yawbench.orchestrator.results.run_record import EARLIER
+from yawbench.foundation.safe_files import open_own, reason
 
 from .jobs import MeasuredRun, MetricValues
 
 FILE = "runs.jsonl"
-FORMAT = 2
-"""Version of the file format; 1 had no checksums."""
-NAMED = 10
-"""Damaged lines reported one by one. Chosen: they fit on a terminal."""
+FORMAT = 3
+"""Version of the file format; that of 0.2 is 1."""
 
 
 class _Line(BaseModel):
-    """Base of the lines; written with checksums of its fields."""
+    """Base of the lines."""
 
     model_config = ConfigDict(strict=True, extra="forbid")
 
     def text(self) -> bytes:
-        """Return the line as JSON with checksums, without fields at their defaults."""
-        content = with_checksums(self.model_dump(exclude_defaults=True))
+        """Return the line as JSON, without fields at their defaults."""
+        content = self.model_dump(exclude_defaults=True)
         return json.dumps(content, ensure_ascii=False).encode("utf-8", "backslashreplace") + b"\n"
-
-    @classmethod
-    def read(cls, line: bytes) -> Any:
-        """Parse a line.
-
-        Raises:
-            ValueError: the line was damaged or edited; says how.
-        """
-        content = _content(line)
-        if not has_checksums(content):
-            raise ValueError("it has no checksums")
-        if changed := changed_since(content):
-            raise ValueError(changed)
-        try:
-            return cls.model_validate({key: x for key, x in content.items() if key != KEY})
-        except ValidationError as errors:
-            first = errors.errors(include_url=False)[0]
-            raise ValueError(f"{'.'.join(map(str, first['loc']))}: {first['msg'].lower()}") from None
 
 
 class _Head(_Line):
@@ -73,22 +49,14 @@ class _Entry(_Line):
     """The record of a finished run."""
 
     key: str
-    values: dict[str, Annotated[tuple[float, str], Field(strict=False)] | None]
+    values: dict[str, Annotated[tuple[StrictFloat, str], Field(strict=False)] | None]
     diagnostics: list[dict[str, Any]] = []
-    problems: list[str] = []  # until 0.2: sentences
-    findings: list[str] = []  # until 0.2: names of warnings
     ended: str | None = None
 
     @property
     def record(self) -> MeasuredRun:
         """The line as a `MeasuredRun`."""
-        earlier = (
-            *(Diagnostic("run-failed", sentence) for sentence in self.problems),
-            *(Diagnostic(EARLIER.get(kind, kind), kind, "warning") for kind in self.findings),
-        )
-        return MeasuredRun(
-            _Packed(self.values), (*map(Diagnostic.of, self.diagnostics), *earlier), self.ended
-        )
+        return MeasuredRun(_Packed(self.values), tuple(map(Diagnostic.of, self.diagnostics)), self.ended)
 
 
 class _Packed(Mapping[str, "tuple[float, str] | None"]):
@@ -149,7 +117,7 @@ class Journal:
             raise
 
     def _take_over(self, lines: list[bytes], head: _Head) -> None:
-        """Read the lines of an existing journal, and rewrite it without damaged ones.
+        """Read the lines of an existing journal; runs of damaged lines will be made again.
 
         Raises:
             ResultsError: it belongs to another experiment, or is not a journal.
@@ -157,53 +125,15 @@ class Journal:
         if not lines:
             self._append(head)
             return
-        damaged: dict[int, str] = {}
-        whole = [head.text()]
-        for number, line in enumerate(lines[1:], start=2):
-            try:
-                entry: _Entry = _Entry.read(line)
-            except ValueError as error:  # noqa: PERF203 - all are named
-                damaged[number] = str(error)
-            else:
-                if not entry.record.of_machine:  # written by an earlier version
-                    self.records[entry.key] = entry.record
-                    whole.append(line + b"\n")
-        try:
-            self._check(_Head.read(lines[0]), head)
-        except ValueError as error:
-            if _is_earlier(lines[0]):
-                self._refuse("an earlier version of this program")
-            if not self.records:
-                raise ResultsError(
-                    f"{self._path}: line 1 is damaged: {error}; --fresh begins anew."
-                ) from None
-            warn_of_record(f"{self._path}: line 1: {error}; the runs below it are kept")
-        for number, why in list(damaged.items())[:NAMED]:
-            warn_of_record(f"{self._path}: line {number}: {why}; its run will be repeated")
-        if len(damaged) > NAMED:
-            warn_of_record(f"{self._path}: {counted(len(damaged) - NAMED, 'more line')} like these")
-        if whole != [line + b"\n" for line in lines]:
-            self._replace(b"".join(whole))
-
-    def _check(self, head: _Head, wanted: _Head) -> None:
-        if head.sweep != wanted.sweep:
-            self._refuse(head.sweep)
-        if head.format != wanted.format:
-            self._refuse("another version of this program")
-
-    def _refuse(self, other: str) -> NoReturn:
-        raise ResultsError(
-            f"{self.folder}: holds the runs of {other}; give another folder with --out, "
-            "or --fresh to begin anew.",
-            code="results-of-another",
-        )
-
-    def _replace(self, content: bytes) -> None:
-        os.close(self._file)
-        try:
-            write_whole(self._path, content)
-        finally:
-            self._file = _opened(self._path)
+        if lines[0] + b"\n" != head.text():
+            other = _sweep_of(lines[0])
+            raise ResultsError(
+                f"{self.folder}: holds the runs of "
+                f"{'another version of this program' if other in ('', head.sweep) else other}; give another "
+                "folder with --out, or --fresh to begin anew.",
+                code="results-of-another",
+            )
+        self.records = _records(lines[1:])
 
     def add(self, key: str, record: MeasuredRun, *, last: bool = True) -> None:
         """Add a finished run.
@@ -252,40 +182,28 @@ def records_in(folder: Path) -> dict[str, MeasuredRun]:
         lines, _ = _whole_lines((folder / FILE).read_bytes())
     except OSError:
         return {}
+    return _records(lines[1:])
+
+
+def _records(lines: list[bytes]) -> dict[str, MeasuredRun]:
     records = {}
-    for line in lines[1:]:
-        with contextlib.suppress(ValueError):
-            entry: _Entry = _Entry.read(line)
+    for line in lines:
+        with contextlib.suppress(ValueError, TypeError, RecursionError):
+            entry = _Entry.model_validate(json.loads(line))
             records[entry.key] = entry.record
     return records
 
 
+def _sweep_of(head: bytes) -> str:
+    """Return the experiment that the first line of a journal names, "" if it is not one."""
+    try:
+        return str(json.loads(head)["sweep"])
+    except (ValueError, TypeError, LookupError, RecursionError):
+        return ""
+
+
 def _opened(path: Path) -> int:
     return open_own(path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
-
-
-def _content(line: bytes) -> dict[str, Any]:
-    """Return the JSON object of a line.
-
-    Raises:
-        ValueError: it is not a JSON object.
-    """
-    try:
-        content = json.loads(line)
-    except (ValueError, RecursionError):
-        raise ValueError("is not JSON") from None
-    if not isinstance(content, dict):
-        raise ValueError("is not a JSON object")
-    return content
-
-
-def _is_earlier(line: bytes) -> bool:
-    """Return whether this is the first line of a journal in the earlier format, without checksums."""
-    try:
-        content = _content(line)
-    except ValueError:
-        return False
-    return content.keys() == {"sweep", "format"} and content["format"] == FORMAT - 1
 
 
 def _whole_lines(data: bytes) -> tuple[list[bytes], int]:

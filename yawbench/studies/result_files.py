@@ -18,14 +18,12 @@ import numpy as np
 
 from yawbench.figures.plots import draw
 from yawbench.figures.style import ROW, LabelledRun, frame, literal, new_figure, save
-from yawbench.foundation.cache import changed_since, warn_of_record, with_checksums
 from yawbench.foundation.errors import ResultsError
 from yawbench.foundation.messages import counted
-from yawbench.foundation.safe_files import read_bytes, reason, write_whole
+from yawbench.foundation.safe_files import reason, write_whole
 from yawbench.metrics.expressions import MetricValue, metric
 from yawbench.metrics.measures import si
 from yawbench.orchestrator.results.reader import Results
-from yawbench.orchestrator.results.run_folder import LARGEST
 from yawbench.orchestrator.scenario.overrides import changed
 
 from .axis_figures import FAILED, Drawing
@@ -185,22 +183,8 @@ def write_findings(findings: ExperimentResult, drawn: dict[str, str], out: Path)
         ResultsError: a file cannot be written.
     """
     write_table(findings, out)
-    _warn_if_edited(out / RECORD)
-    content = with_checksums(record_of(findings, drawn))
+    content = record_of(findings, drawn)
     write_whole(out / RECORD, json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
-
-
-def _warn_if_edited(file: Path) -> None:
-    """Warn if a record that is about to be overwritten was edited since it was written."""
-    try:
-        content = json.loads(read_bytes(file, largest=LARGEST))
-        words = changed_since(content) if isinstance(content, dict) else "it is not a record"
-    except FileNotFoundError:
-        return
-    except (OSError, ValueError, RecursionError):
-        words = "it cannot be read"
-    if words:
-        warn_of_record(f"{file}: {words} since it was written; it is written anew from the runs")
 
 
 def record_of(findings: ExperimentResult, drawn: Mapping[str, str] | None = None) -> dict[str, Any]:
