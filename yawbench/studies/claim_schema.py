@@ -9,15 +9,10 @@ run is missing or a divisor is zero.
 
 from __future__ import annotations
 
-import ast
-import math
-import operator
 import re
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Annotated, Any, Literal, get_args
 
-import numpy as np
 from pydantic import (
     AfterValidator,
     ConfigDict,
@@ -37,6 +32,8 @@ from yawbench.metrics.measures import MEASURES
 from yawbench.metrics.verdict import SYMBOLS, Relation
 from yawbench.orchestrator.scenario.quantities import convert
 from yawbench.orchestrator.scenario.schema_validation import StrictModel, exactly_one
+
+from .expression import ExpressionField
 
 
 def text_of(value: object) -> str:
@@ -83,90 +80,6 @@ _QUANTITY = {"anyOf": [_NUMBER, {"type": "string", "pattern": r"^\s*[+-]?\.?\d"}
 Number = Annotated[float | int, PlainValidator(_number), WithJsonSchema(_NUMBER)]
 QuantityText = Annotated[float | int | str, PlainValidator(_quantity), WithJsonSchema(_QUANTITY)]
 """A number in SI units, or text with a number and its unit."""
-
-
-LONGEST = 400
-"""Characters of an expression. Chosen: eight times our longest; bounds the depth of recursion."""
-
-_OPERATIONS: dict[type[ast.operator], Callable[[float, float], float]] = {
-    ast.Add: operator.add,
-    ast.Sub: operator.sub,
-    ast.Mult: operator.mul,
-    ast.Div: operator.truediv,
-}
-
-
-def parse(text: str) -> ast.expr:
-    """Parse an arithmetic expression.
-
-    Raises:
-        ValueError: the text is not an expression, or contains more than arithmetic.
-    """
-    if len(text) > LONGEST:
-        raise ValueError(f"{short(text)}: an expression has at most {LONGEST} characters")
-    try:
-        tree = ast.parse(text.strip(), mode="eval").body
-    except (SyntaxError, ValueError, RecursionError, MemoryError):  # syntax, null bytes, nested brackets
-        raise ValueError(f"{short(text)} is not an expression such as (a - b) / a") from None
-    for node in _nodes(tree):
-        plain = isinstance(node, ast.Constant) and type(node.value) in (int, float)
-        if not (plain or isinstance(node, (ast.Name, ast.BinOp, ast.UnaryOp))):
-            raise ValueError(f"{text!r}: only numbers, names, + - * / and parentheses are allowed")
-        if isinstance(node, ast.BinOp) and type(node.op) not in _OPERATIONS:
-            raise ValueError(f"{text!r}: only + - * / are allowed")
-        if isinstance(node, ast.UnaryOp) and not isinstance(node.op, ast.USub):
-            raise ValueError(f"{text!r}: only + - * / are allowed")
-    return tree
-
-
-def _nodes(tree: ast.expr) -> Iterator[ast.expr]:
-    return (node for node in ast.walk(tree) if isinstance(node, ast.expr))
-
-
-def names_in(text: str) -> list[str]:
-    """Return the names in an expression, each once."""
-    return list(dict.fromkeys(node.id for node in _nodes(parse(text)) if isinstance(node, ast.Name)))
-
-
-def calculate(text: str, values: Mapping[str, float]) -> float | None:
-    """Return the value of an expression; None if it divides by zero or is not finite.
-
-    Args:
-        text: the expression.
-        values: name -> value, of every name in it.
-    """
-
-    def value_of(node: ast.expr) -> float:
-        if isinstance(node, ast.BinOp):
-            return _OPERATIONS[type(node.op)](value_of(node.left), value_of(node.right))
-        if isinstance(node, ast.UnaryOp):
-            return -value_of(node.operand)
-        if isinstance(node, ast.Name):
-            return values[node.id]
-        assert isinstance(node, ast.Constant)
-        return float(node.value)  # type: ignore[arg-type]
-
-    try:
-        number = value_of(parse(text))
-    except (ZeroDivisionError, OverflowError):
-        return None
-    return number if math.isfinite(number) else None
-
-
-def ranks(x: Sequence[float] | np.ndarray) -> np.ndarray:
-    """Return the ranks of values, from 1; ties get the mean of their ranks."""
-    array = np.asarray(x, dtype=float)
-    below = (array[:, None] > array[None, :]).sum(axis=1)
-    equal = (array[:, None] == array[None, :]).sum(axis=1)
-    average: np.ndarray = below + (equal + 1) / 2
-    return average
-
-
-def rank_correlation(x: Sequence[float], y: Sequence[float]) -> float | None:
-    """Return Spearman's rank correlation of two sequences of equal length; None if one is constant."""
-    a, b = (ranks(values) - (len(values) + 1) / 2 for values in (x, y))
-    scale = math.sqrt(float(a @ a) * float(b @ b)) if len(x) > 1 else 0.0
-    return float(a @ b) / scale if scale > 0 else None
 
 
 CELLS = 10_000
@@ -299,11 +212,6 @@ class MetricSource(StrictModel):
     metric: str
 
 
-def _expression(text: str) -> str:
-    parse(text)
-    return text
-
-
 class DerivedSpec(StrictModel):
     """A number derived from several runs: an expression of metrics, or a grid's rank correlation."""
 
@@ -313,7 +221,7 @@ class DerivedSpec(StrictModel):
     for_each: dict[str, Alternatives] = Field(
         {}, alias="for", description="Key -> values; one number per combination, named in its key by {key}"
     )
-    expression: Annotated[str, AfterValidator(_expression)] | None = None
+    expression: ExpressionField | None = None
     of: dict[str, MetricSource] = Field({}, description="Name in the expression -> metric of a run")
     rank_correlation: str | None = Field(None, description="Grid whose order is compared with the paper's")
     only: dict[str, Alternatives] = Field(
@@ -328,7 +236,7 @@ class DerivedSpec(StrictModel):
             raise ValueError("needs exactly one of expression and rank_correlation")
         if self.only and self.rank_correlation is None:
             raise ValueError("only: belongs to a rank_correlation")
-        for name in names_in(self.expression) if self.expression else ():
+        for name in self.expression.names if self.expression else ():
             if name not in self.of:
                 raise ValueError(f"expression: {name} is undefined; 'of' has {listed(self.of)}")
         if self.published is not None:
@@ -425,16 +333,6 @@ class Claim(Assertion):
     def number(self, otherwise: int) -> int:
         """Return the index of the file's entry that the claim was expanded from; else `otherwise`."""
         return otherwise if self._number is None else self._number
-
-
-class ValidationSpec(StrictModel):
-    """A run compared with measurements of the car."""
-
-    run: str = Field(description="Name of a run, of a steady-state test")
-    measured: str = Field(description="Measurement file, relative to this file", min_length=1)
-    bands: str = Field(
-        "steady_state", description="Tolerances: a name in scenarios/bands, or a file beside it"
-    )
 
 
 class LimitSpec(Assertion):

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 from yawbench.fmus.fmu import Fmu
-from yawbench.foundation import plugins
 from yawbench.foundation.errors import Diagnostic, Location, ScenarioError
 from yawbench.metrics.expressions import STANDARD, TimeWindow, metric, results_to_be, unit_in
 from yawbench.orchestrator.plan import Override, OverrideOrigin, Plan
@@ -28,6 +27,7 @@ from .claim_schema import MetricReference, MetricSpec, si_number
 from .jobs import Job, MetricRequests, TestRequest, key_of, plans_of
 from .on_demand import OnDemand
 from .schema import ExperimentSpec
+from .sections import sections
 
 FIGURES = "figures"
 """Folder of the figures, next to the folders of named runs."""
@@ -193,10 +193,12 @@ class LoadedExperiment(LoadedFile):
         return next(((name, target) for name, axis in axes if target in axis.targets), None)
 
     @cached_property
-    def recordings(self) -> Any:
-        """The validations with their measurements and bands, as `validating` loads them."""
-        validations = self.spec.validations
-        return validating().load(validations, self.path.parent) if validations else []
+    def loaded_sections(self) -> dict[str, Any]:
+        """Key of a section that a part adds -> what it has loaded for the entries of the file."""
+        entries = {name: getattr(self.spec, name, None) for name in sections()}
+        return {
+            name: sections()[name].load(given, self.path.parent) for name, given in entries.items() if given
+        }
 
     def _at(self, point: DesignPoint, run: NamedRun | None = None) -> list[Override]:
         """Return the overrides at a point; with `run`, only those of axes that apply to it."""
@@ -407,12 +409,3 @@ def _unit(axis: AxisSpec, plan: Plan) -> str | None:
     if target.kind == "fact":
         return FACTS[target.variable].unit
     return next((variable.unit for _, variable in reached(plan, target)), None)
-
-
-def validating() -> Any:
-    """Return what compares runs with measured cars: a module that loads, compares, tabulates and shows.
-
-    Raises:
-        ScenarioError: it is not installed.
-    """
-    return plugins.require("judge of a study", "validations")

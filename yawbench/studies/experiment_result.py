@@ -14,18 +14,21 @@ from yawbench.figures.style import digits_of
 from yawbench.foundation.errors import Diagnostic, ResultsError
 from yawbench.foundation.messages import counted
 from yawbench.metrics.expressions import MetricValue
-from yawbench.metrics.verdict import PERCENT, Status, Verdict, not_judged, worst
+from yawbench.metrics.verdict import PERCENT, Judged, Status, Verdict, not_judged
 from yawbench.orchestrator.plan import Plan
 from yawbench.orchestrator.results.reader import Results
 from yawbench.orchestrator.results.run_folder import RUN_FILE
 
 from .axes import RUN, DesignPoint, Level
-from .claim_schema import Claim, LimitSpec, calculate
-from .claims import ClaimResult, Judgement, MetricTable, Region, correlation, judge
+from .claim_schema import Claim, LimitSpec
+from .claims import ClaimResult, comparisons, judge
 from .confidence import interval, share_bounds
-from .experiment import Case, LoadedExperiment, NamedRun, PlannedExperiment, metrics_of, validating
+from .derived import MetricTable, derive
+from .experiment import Case, LoadedExperiment, NamedRun, PlannedExperiment, metrics_of
 from .jobs import NOT_MADE, MeasuredRun, Outcome, measured, read_back
+from .region_verdicts import Region
 from .schema import ExperimentSpec
+from .sections import sections
 from .tables import Cell, Table
 
 K = TypeVar("K")
@@ -237,35 +240,29 @@ class ExperimentResult:
         return self._judged("checks", self.spec.checks)
 
     @cached_property
-    def validations(self) -> list[Any]:
-        """The comparisons with measured cars, of the runs that have results."""
-        recordings = self.experiment.recordings
-        return validating().compare(self.results, recordings) if recordings else []
+    def sections(self) -> dict[str, list[Any]]:
+        """Key of a section that a part adds -> its findings on the runs that have results."""
+        loaded = self.experiment.loaded_sections
+        return {
+            name: section.compare(self.results, loaded[name]) if name in loaded else []
+            for name, section in sections().items()
+        }
 
     @property
     def judgements(self) -> list[ClaimResult]:
         """Claims and checks."""
         return [*self.claims, *self.checks]
 
-    def _judged(self, group: str, claims: Sequence[Claim]) -> list[ClaimResult]:
+    def _judged(self, group: Judged, claims: Sequence[Claim]) -> list[ClaimResult]:
+        """Judge claims; with axes they must hold at every setting."""
+        labels = {run.name: run.row for run in self.experiment.runs.values()}
+        settings = [(values, labels, self.derived_at[at]) for at, values in self.at.items()]
         return [
-            ClaimResult(
-                **vars(self.judge(claim)), claim=claim, region=self.regions.get((group, i)), group=group
+            ClaimResult.of(
+                claim, group, [comparisons(claim, *at) for at in settings], self.regions.get((group, i))
             )
             for i, claim in enumerate(claims)
         ]
-
-    def judge(self, claim: Claim) -> Judgement:
-        """Judge a claim; with axes it must hold at every setting."""
-        words = {run.name: run.row for run in self.experiment.runs.values()}
-        every = [judge(claim, values, words, self.derived_at[at]) for at, values in self.at.items()]
-        if len(every) == 1:
-            return every[0]
-        verdicts = [judgement.verdict for judgement in every]
-        holding = sum(verdict.holds is True for verdict in verdicts)
-        verdict = worst(verdicts) or Verdict(Status.PASSED)
-        text = f"holds at {holding} of {counted(len(every), 'point')}"
-        return Judgement(replace(verdict, margin=None), measured=(text,))
 
     def light(self) -> ExperimentResult:
         """Return a reduced copy with what figures over axes need, cheap to send to other processes."""
@@ -325,22 +322,6 @@ def judge_results(
     return ExperimentResult(experiment, records, results, planned)
 
 
-def derive(spec: ExperimentSpec, values: MetricTable) -> dict[str, MetricValue]:
-    """Compute the derived numbers, without those whose runs are missing."""
-    derived: dict[str, MetricValue] = {}
-    for key, entry in spec.derived.items():
-        number = None
-        if entry.rank_correlation is not None:
-            number = correlation(spec.grids[entry.rank_correlation], values, entry.only)
-        elif entry.expression is not None:
-            known = {word: values.get((source.run, source.metric)) for word, source in entry.of.items()}
-            numbers = {word: value.number for word, value in known.items() if value is not None}
-            number = calculate(entry.expression, numbers) if len(numbers) == len(known) else None
-        if number is not None:
-            derived[key] = MetricValue(number, entry.unit)
-    return derived
-
-
 @dataclass(frozen=True)
 class Limit:
     """Limit of an axis for a run and a setting of the other axes, in the unit of the file."""
@@ -381,7 +362,7 @@ def _limit(
     by_setting = {findings.experiment.setting(case.point): case for case in reversed(cases)}
     for setting in sorted(by_setting, key=lambda setting: float(setting[at].value)):
         here, case = float(setting[at].value), by_setting[setting]
-        verdict = judge(spec, findings.at[setting], {run.name: run.row}).verdict
+        verdict = judge(spec, findings.at[setting], {run.name: run.row})
         if not verdict.holds:
             records = (findings.record(case) for case in findings.cases_of(run, setting))
             if lost := next((record for record in records if not record.ok), None):

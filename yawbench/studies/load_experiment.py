@@ -13,6 +13,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
+from pydantic import BaseModel, Field, create_model
+
 from yawbench.foundation.errors import ScenarioError
 from yawbench.foundation.messages import hint, short
 from yawbench.foundation.safe_files import reads
@@ -24,10 +26,19 @@ from yawbench.orchestrator.signal_names import Target
 
 from .axes import RUN, changes_of_file, levels_of, names_of
 from .claim_schema import Claim, DerivedSpec, MetricReference, text_of
-from .claims import cells
+from .derived import cells
 from .experiment import FIGURES, LoadedExperiment, NamedRun
 from .schema import ChoiceSpec, ExperimentSpec, FigureSpec, RunSpec
+from .sections import sections
 
+_ADDED: dict[str, Any] = {
+    name: (list[section.entry], Field([], description=section.says))  # type: ignore[name-defined]
+    for name, section in sections().items()
+}
+ExperimentFile = create_model(
+    "ExperimentSpec", __base__=ExperimentSpec, __doc__=ExperimentSpec.__doc__, **_ADDED
+)
+"""Schema of experiment files, with the sections that parts add."""
 SENTENCES = ("says", "short", "source", "note")
 """Fields of claims and derived numbers that are prose, where `{name}` becomes the label of a value."""
 MOST = 10_000
@@ -73,7 +84,7 @@ def load_experiment(path: Path | str, *, changes: Sequence[Override] = ()) -> Lo
     path = Path(path)
     document = yaml_lines.read(path, what="experiment file")
     overrides.apply_to_all_runs(document, changes)
-    spec = validated(ExperimentSpec, document)
+    spec = validated(ExperimentFile, document)
     spec = expanded(spec, document)
     runs = {"": NamedRun("", "", "", path.parent / spec.scenario, ())} if spec.scenario else {}
     for i, entry in enumerate(spec.runs):
@@ -94,7 +105,7 @@ def load_experiment(path: Path | str, *, changes: Sequence[Override] = ()) -> Lo
         check_axes(spec, document)
         check_names(experiment, document)
     document.raise_errors()
-    _ = experiment.recordings  # a mistake in a measurement file is told before the runs are made
+    _ = experiment.loaded_sections  # a mistake in a file that they name is told before the runs are made
     return experiment
 
 
@@ -118,19 +129,19 @@ class ForBinding:
         return re.sub(r"\{(\w+)\}", lambda match: use.get(match[1], match[0]), text)
 
     def filled(self, entry: Texts) -> Texts:
-        """Return the entry with all its texts filled in."""
+        """Return the entry, which is valid already, with all its texts filled in."""
 
         def fill(part: Any, name: str = "") -> Any:
+            if isinstance(part, BaseModel):
+                given = part.model_fields_set - {"for_each"}
+                return part.model_copy(update={field: fill(getattr(part, field), field) for field in given})
             if isinstance(part, dict):
                 return {k: fill(v, k) for k, v in part.items()}
             if isinstance(part, list):
                 return [fill(v, name) for v in part]
             return self.fill(part, sentence=name in SENTENCES) if isinstance(part, str) else part
 
-        if not self.values:
-            return entry
-        fields = entry.model_dump(by_alias=True, exclude_defaults=True, exclude={"for_each"})
-        return type(entry).model_validate(fill(fields))
+        return fill(entry).model_copy(update={"for_each": {}}) if self.values else entry
 
 
 def fillings(
@@ -226,6 +237,9 @@ def check_axes(spec: ExperimentSpec, document: Document) -> None:
                 also = f"axis {seen[target]!r}" if seen[target] in spec.axes else "set or swap"
                 document.report(("axes", name), f"{target} is given by {also} already", "name-duplicate")
             seen[target] = name
+    for section in sections() if spec.axes else ():
+        if getattr(spec, section):
+            document.report((section,), "is about named runs, not about runs along axes")
     for group, names in (("axes", spec.axes), ("metrics", spec.metrics)):
         for name in names:
             if name in COLUMNS or (group == "axes" and name in spec.metrics):
@@ -283,8 +297,9 @@ def _names(spec: ExperimentSpec) -> Iterator[tuple[str, str, KeyPath]]:
             yield "open value", name, (group, i, "open_values", k)
     if spec.tuning:
         yield "derived number", spec.tuning.objective, ("tuning", "objective")
-    for i, validation in enumerate(spec.validations):
-        yield "run", validation.run, ("validations", i, "run")
+    for section in sections():
+        for i, entry in enumerate(getattr(spec, section)):
+            yield "run", entry.run, (section, i, "run")
     for name, limit in spec.limits.items():
         yield "axis", limit.of, ("limits", name, "of")
     for i, figure in enumerate(spec.figures):

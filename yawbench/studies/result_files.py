@@ -30,10 +30,11 @@ from yawbench.orchestrator.scenario.overrides import changed
 
 from .axis_figures import FAILED, Drawing
 from .claim_schema import si_number, text_of
-from .claims import ClaimResult, Region
+from .claims import ClaimResult
 from .experiment import FIGURES
 from .experiment_result import Each, ExperimentResult, limits_of
-from .result_tables import heading, verdict
+from .region_verdicts import Region
+from .result_tables import heading, measured_words, verdict
 from .schema import FigureSpec
 from .tables import Table, column, to_csv
 
@@ -240,7 +241,7 @@ def record_of(findings: ExperimentResult, drawn: Mapping[str, str] | None = None
         "derived": {
             key: {
                 "says": number.says,
-                "expression": number.expression,
+                "expression": number.expression and str(number.expression),
                 "of": {word: [source.run, source.metric] for word, source in number.of.items()},
                 "rank_correlation": number.rank_correlation,
                 "published": None if number.published is None else si_number(number.published, number.unit),
@@ -250,7 +251,7 @@ def record_of(findings: ExperimentResult, drawn: Mapping[str, str] | None = None
         },
         "claims": [_judgement(result) for result in findings.claims],
         "checks": [_judgement(result) for result in findings.checks],
-        "validations": [validation.as_data() for validation in findings.validations],
+        **{name: [finding.as_data() for finding in found] for name, found in findings.sections.items()},
         "limits": {
             key: [
                 {
@@ -285,7 +286,7 @@ def _judgement(result: ClaimResult) -> dict[str, Any]:
         "says": result.claim.says,
         "source": result.claim.source,
         "holds_if": [str(condition) for condition in result.claim.holds_if],
-        "measured": list(result.measured),
+        "measured": measured_words(result),
         "holds": result.verdict.holds,
         "verdict": verdict(result),
         **{key: deciding[key] for key in ("value", "relation", "bound", "unit", "margin")},

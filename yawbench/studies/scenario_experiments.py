@@ -30,6 +30,7 @@ from yawbench.fmus.fmu import is_path
 from yawbench.foundation.errors import ResultsError, ScenarioError
 from yawbench.metrics.expressions import MetricValue, metric, while_moving
 from yawbench.metrics.measures import variable_of, words
+from yawbench.metrics.verdict import Status, worded
 from yawbench.orchestrator.plan import Override, Plan
 from yawbench.orchestrator.recordings.motion import largest
 from yawbench.orchestrator.results.reader import load_results
@@ -156,7 +157,7 @@ def comparison_table(findings: ExperimentResult) -> Table:
     for key, spec in findings.spec.metrics.items():
         cells: list[Cell] = [findings.values.get((run.name, key)) for run in shown]
         chosen = metric(spec.metric)
-        table.rows.append([chosen.title, chosen.formula, *cells, *("failed" for _ in failed)])
+        table.rows.append([chosen.title, chosen.formula, *cells, *(worded(Status.FAILED) for _ in failed)])
     table.notes += [f"{r.label}: {results[r.name].ended}" for r in shown if results[r.name].ended]
     return table
 

@@ -59,11 +59,6 @@ column's cells hold.
         for: {fault: {frozen: gyro frozen}}
         holds_if: [{run: "{fault}", metric: sideslip, at_most: 5 deg}]
 
-A validation compares a run with measurements of the car (`docs/measured_cars.md`).
-
-    validations:
-      - {run: ramp, measured: measured.yaml, bands: steady_state}
-
 A verdict at one point may flip nearby. A region names the values that the paper leaves open, each with a
 range; claims are judged again along each of them, and at the points of a Latin hypercube over all together.
 
@@ -161,7 +156,6 @@ from .claim_schema import (
     MetricSpec,
     Patterns,
     QuantityText,
-    ValidationSpec,
     alternatives,
 )
 
@@ -378,7 +372,6 @@ class ExperimentSpec(OverrideSpec):
     claims: list[Claim] = Field([], description="Claims of the paper")
     checks: list[Claim] = Field([], description="Checks of this project on its results")
     region: RegionSpec | None = Field(None, description="Open values over which claims are judged again")
-    validations: list[ValidationSpec] = Field([], description="Runs to be compared with measured cars")
     limits: dict[str, LimitSpec] = {}
     figures: list[FigureSpec] = []
     keep: Literal["limits", "all", "none"] = Field(
@@ -394,8 +387,6 @@ class ExperimentSpec(OverrideSpec):
             raise ValueError("needs either a scenario or runs")
         if self.scenario and not self.axes and not self.tuning:
             raise ValueError("a single run needs axes")
-        if self.validations and self.axes:
-            raise ValueError("validations: of named runs, not of runs along axes")
         if self.region and self.axes:
             raise ValueError("region: runs along axes have none; it is for named runs at one point")
         if self.tuning and (self.axes or self.region):

@@ -33,6 +33,7 @@ from yawbench.metrics.expressions import (
 )
 from yawbench.metrics.measures import catalogue as measures
 from yawbench.metrics.measures import si_of, symbol
+from yawbench.metrics.verdict import VerdictText
 from yawbench.orchestrator.plan import Plan
 from yawbench.orchestrator.recordings.motion import LEAST_SPEED
 from yawbench.orchestrator.results.reader import FoundRun, Results, load_results
@@ -158,7 +159,7 @@ def _shown(cell: Cell, unit: str = "") -> str:
     if cell is None:
         return "-"
     if isinstance(cell, str):
-        return printable(cell)
+        return cell if isinstance(cell, VerdictText) else printable(cell)
     if isinstance(cell, int):
         return str(cell)
     value = cell if isinstance(cell, MetricValue) else MetricValue(cell, unit or "1")
