@@ -17,6 +17,7 @@ from yawbench.metrics.expressions import STANDARD, TimeWindow, metric, results_t
 from yawbench.orchestrator.plan import Override, OverrideOrigin, Plan
 from yawbench.orchestrator.results.reader import Results
 from yawbench.orchestrator.scenario import quantities
+from yawbench.orchestrator.scenario.schema_validation import made
 from yawbench.orchestrator.scenario.yaml_lines import dotted
 from yawbench.orchestrator.signal_names import Target
 from yawbench.orchestrator.wiring.context import FACTS, reached
@@ -26,7 +27,8 @@ from .axes import AxisSpec, DesignAxisSpec, DesignPoint, Level, changes_at, grid
 from .claim_schema import MetricReference, MetricSpec, si_number
 from .jobs import Job, MetricRequests, TestRequest, key_of, plans_of
 from .on_demand import OnDemand
-from .schema import ExperimentSpec
+from .references import problems_of, refuse
+from .schema import ExperimentSpec, RunSpec
 from .sections import sections
 
 FIGURES = "figures"
@@ -228,15 +230,25 @@ def experiment_of(
 
     Args:
         path: the file that it is made of; its folder and name identify it.
-        runs: the named runs.
+        runs: the named runs, or one without a name.
         changes: overrides of all runs.
         axes, design, origin: see `LoadedExperiment`.
-        keys: of the schema, such as its title, metrics and figures.
+        keys: of the schema: its title, metrics, figures, ... as specifications.
+
+    Raises:
+        ScenarioError: it is invalid; lists all errors.
     """
     named = {run.name: run for run in runs}
-    listed = [{"name": run.name, "scenario": run.scenario.name} for run in named.values()]
-    spec = ExperimentSpec.model_validate({"runs": listed, **keys}).model_copy(update={"axes": axes or {}})
-    return LoadedExperiment(path, spec, named, (), tuple(changes), tuple(design), origin)
+    if [*named] == [""]:
+        keys["scenario"] = named[""].scenario.name
+    else:
+        keys["runs"] = [made(RunSpec, name=name, scenario=run.scenario.name) for name, run in named.items()]
+    spec = made(ExperimentSpec, **keys, axes={} if design else axes or {})
+    if design:  # its points are not those of all axes
+        spec = spec.model_copy(update={"axes": axes or {}})
+    experiment = LoadedExperiment(path, spec, named, (), tuple(changes), tuple(design), origin)
+    refuse(problems_of(experiment))
+    return experiment
 
 
 @dataclass(frozen=True)

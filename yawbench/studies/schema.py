@@ -266,6 +266,7 @@ Chosen = Annotated[
         lambda value: value if isinstance(value, list) else [value],
         json_schema_input_type=list[Scalar] | Scalar,
     ),
+    Field(min_length=1),
 ]
 
 
