@@ -36,8 +36,9 @@ _ADDED: dict[str, Any] = {
     for name, section in sections().items()
 }
 ExperimentFile = create_model(
-    "ExperimentSpec", __base__=ExperimentSpec, __doc__=ExperimentSpec.__doc__, **_ADDED
-)
+    "ExperimentSpec", __base__=ExperimentSpec, __doc__=ExperimentSpec.__doc__, __module__=__name__,
+    __qualname__="ExperimentFile", **_ADDED,
+)  # fmt: skip
 """Schema of experiment files, with the sections that parts add."""
 SENTENCES = ("says", "short", "source", "note")
 """Fields of claims and derived numbers that are prose, where `{name}` becomes the label of a value."""
