@@ -27,7 +27,8 @@ from yawbench.studies.experiment import NamedRun, experiment_of, metrics_of, pla
 from yawbench.studies.experiment_result import ExperimentResult
 from yawbench.studies.jobs import Job, Outcome, measured
 from yawbench.studies.references import problems_of_figure, refuse
-from yawbench.studies.result_files import columns_of, draw_over_axes
+from yawbench.studies.result_figures import draw_over_axes
+from yawbench.studies.result_files import columns_of
 from yawbench.studies.schema import FigureSpec
 from yawbench.studies.tables import to_pandas
 

@@ -149,11 +149,9 @@ def made(model: type[Model], argument: str = "", /, **fields: Any) -> Model:
     document = Document(Path(), fields)
     content = validate(model, document)
     if content is None:
-        places = (".".join(filter(None, (argument, one.location.target))) for one in document.errors)
-        raise ScenarioError(
-            [replace(one, location=Location(target=at)) for one, at in zip(document.errors, places, strict=True)],
-            code="argument-invalid",
-        )
+        located = ((one, ".".join(filter(None, (argument, one.location.target)))) for one in document.errors)
+        errors = [replace(one, location=Location(target=place)) for one, place in located]
+        raise ScenarioError(errors, code="argument-invalid")
     return content
 
 

@@ -21,11 +21,12 @@ from yawbench.metrics.expressions import MetricValue
 from yawbench.reports.comparison import BEST, comparison_facts, metric_table
 from yawbench.studies import result_files
 from yawbench.studies.claim_schema import MetricSpec
+from yawbench.studies.comparison import FIGURE_SPECS, comparison_table, variants
 from yawbench.studies.experiment import NamedRun, experiment_of
 from yawbench.studies.experiment_result import judge_results
 from yawbench.studies.jobs import Job, Outcome
-from yawbench.studies.result_files import draw_all, write_findings
-from yawbench.studies.scenario_experiments import FIGURE_SPECS, comparison_table, variants
+from yawbench.studies.result_figures import draw_all
+from yawbench.studies.result_files import write_findings
 from yawbench.studies.schema import ExperimentSpec
 
 from .recorded import car, write

@@ -27,7 +27,8 @@ from yawbench.studies.experiment_result import judge_results
 from yawbench.studies.expression import Expression
 from yawbench.studies.jobs import Job, Outcome
 from yawbench.studies.load_experiment import load_experiment
-from yawbench.studies.result_files import draw_all, draw_over_axes, write_findings
+from yawbench.studies.result_figures import draw_all, draw_over_axes
+from yawbench.studies.result_files import write_findings
 from yawbench.studies.result_tables import claim_tables, derived_tables, measured_words, run_tables, share
 from yawbench.studies.tables import Table, for_terminal
 

@@ -32,7 +32,7 @@ from yawbench.studies.experiment import FIGURES, LoadedExperiment
 from yawbench.studies.experiment_result import Each, ExperimentResult
 from yawbench.studies.jobs import Job
 from yawbench.studies.open_value_regions import runs_of as runs_of_claim
-from yawbench.studies.result_files import runs_of, title_of
+from yawbench.studies.result_figures import runs_of, title_of
 from yawbench.studies.result_tables import (
     counts_of,
     derived_tables,

@@ -26,7 +26,8 @@ from .axes import RUN, Level, names_of
 from .claim_schema import si_number, text_of
 from .derived import cells
 from .experiment import Case
-from .experiment_result import ExperimentResult, limits_of
+from .experiment_result import ExperimentResult
+from .limits import limits_of
 from .schema import FigureSpec
 
 if TYPE_CHECKING:

@@ -1,7 +1,4 @@
-"""Tables of results for people: an experiment's runs, grids, derived numbers, verdicts and limits.
-
-Also the tables of standard tests: all quantities of one run, or a row per run.
-"""
+"""Tables of results for people: an experiment's runs, grids, derived numbers, verdicts and limits."""
 
 from __future__ import annotations
 
@@ -11,12 +8,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 from yawbench.figures.style import DIGITS, digits_apart, digits_of, shown
-from yawbench.foundation.errors import text_of
 from yawbench.foundation.messages import counted
 from yawbench.metrics.expressions import MetricValue, metric
 from yawbench.metrics.verdict import Status, Verdict, VerdictText, worded
 from yawbench.orchestrator.scenario.overrides import changed
-from yawbench.proving_ground.standard_tests import Evaluation, StandardTest, TestQuantity, TestSeries
 
 from .axes import levels_of
 from .claim_schema import GridSpec, MetricReference, MetricSpec, si_number
@@ -24,8 +19,9 @@ from .claims import ClaimResult, Comparison, RunValue
 from .confidence import Bounds
 from .derived import GridCell, cells, correlation, ranked
 from .experiment import NamedRun
-from .experiment_result import ExperimentResult, limit_table
+from .experiment_result import ExperimentResult
 from .jobs import NOT_MADE
+from .limits import limit_table
 from .schema import TableSpec
 from .sections import sections
 from .tables import Cell, Column, Table, marked, remarks
@@ -413,40 +409,3 @@ def claim_tables(findings: ExperimentResult) -> list[Table]:
             table.notes.append(f"verdicts: {only}")
         tables += [table] if table.rows else []
     return tables
-
-
-def _cell(quantity: TestQuantity | None) -> Cell:
-    if quantity is None or quantity.value is None:
-        return None
-    return MetricValue(quantity.value, quantity.shown_in)
-
-
-def run_table(judged: Evaluation, title: str) -> Table:
-    """Return the table of a standard test's run: a row per quantity with its reading, verdicts as notes."""
-    rows: list[Sequence[Cell]] = [
-        [quantity.name, _cell(quantity), quantity.reading] for quantity in judged.quantities.values()
-    ]
-    notes = [f"{name}: {result}" for name, result in judged.criteria.items()]
-    return Table(
-        f"{judged.label}: {title}",
-        ["quantity", "value", "reading"],
-        rows,
-        [*notes, *map(str, judged.diagnostics)],
-    )
-
-
-def runs_table(runs: Sequence[Evaluation], test: StandardTest, series: TestSeries | None) -> Table:
-    """Return the table of a standard test's runs, in the given order, with the series' verdict as notes."""
-    keys = [key for key in test.columns if any(key in run.quantities for run in runs)]
-    names = {key: run.quantities[key].name for run in reversed(runs) for key in keys if key in run.quantities}
-    criteria = list(dict.fromkeys(name for run in runs for name in run.criteria))
-    rows: list[Sequence[Cell]] = []
-    for run in runs:
-        words = [worded(run.criteria[name].status) if name in run.criteria else "-" for name in criteria]
-        rows.append([run.label, *(_cell(run.quantities.get(key)) for key in keys), *words])
-    notes = []
-    if series:
-        notes += [f"{name}: {result}" for name, result in series.criteria.items()]
-        notes.append(series.summary)
-    notes += [f"{run.label}: {text_of(run.diagnostics)}" for run in runs if run.diagnostics]
-    return Table(test.says, ["run", *(names[key] for key in keys), *criteria], rows, notes)
