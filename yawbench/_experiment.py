@@ -309,7 +309,8 @@ class Runs:
             mark=self._limit("mark", mark, metric),
             only={axis: _levels_of(axis, chosen) for axis, chosen in levels.items()},
         )
-        refuse(problems_of_figure(self._findings.experiment, spec))
+        experiment = self._findings.experiment
+        refuse(problems_of_figure(experiment.spec, experiment.runs, spec))
         return shown_in_notebooks(draw_over_axes(self._findings, spec))
 
     def _limit(self, name: str, value: float | str | None, metric: str) -> Value | None:

@@ -10,6 +10,7 @@ from pydantic import Field
 from yawbench.orchestrator.recordings.measurement import Measurement, load_measurement
 from yawbench.orchestrator.results.reader import Results
 from yawbench.orchestrator.scenario.schema_validation import StrictModel
+from yawbench.studies.claim_schema import RunName
 from yawbench.studies.sections import Section
 
 from .validation import Bands, Validation, compare_run, load_bands
@@ -19,7 +20,7 @@ from .validation_page import validation_facts, validation_table
 class ValidationSpec(StrictModel):
     """A run compared with measurements of the car (`docs/measured_cars.md`)."""
 
-    run: str = Field(description="Name of a run, of a steady-state test")
+    run: RunName = Field(description="Name of a run, of a steady-state test")
     measured: str = Field(description="Measurement file, relative to this file", min_length=1)
     bands: str = Field(
         "steady_state", description="Tolerances: a name in scenarios/bands, or a file beside it"

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import re
 import sys
+from dataclasses import dataclass
 from typing import Annotated, Any, Literal, get_args
 
 from pydantic import (
@@ -126,7 +127,21 @@ WindowField = Annotated[tuple[float, float], PlainValidator(_window), WithJsonSc
 MetricName = Annotated[
     str, AfterValidator(_metric_name), WithJsonSchema({"type": "string", "pattern": _METRIC_PATTERN})
 ]
-Patterns = Annotated[list[str], Field(min_length=1)]
+
+
+@dataclass(frozen=True)
+class NameOf:
+    """Mark of a field that names something in its experiment: by its text, texts of a list or keys."""
+
+    kind: Literal[
+        "run", "runs", "metric", "axis", "axis or run", "derived number", "grid", "limit", "open value"
+    ]
+
+
+RunName = Annotated[str, NameOf("run")]
+MetricKey = Annotated[str, NameOf("metric")]
+DerivedKey = Annotated[str, NameOf("derived number")]
+Patterns = Annotated[list[str], Field(min_length=1), NameOf("runs")]
 """Names of runs; `*` and `?` are wildcards."""
 
 
@@ -170,7 +185,7 @@ class GridSpec(StrictModel):
     """A metric of many runs in rows and columns, with the paper's numbers to compare."""
 
     title: str = Field(min_length=1)
-    metric: str = ""
+    metric: MetricKey = ""
     run: str = Field("", description="Names of the runs, with {name} for row and column")
     derived: str = Field(
         "", description="Instead of metric and run: keys of `derived`, with {name} for row and column"
@@ -208,8 +223,8 @@ class GridSpec(StrictModel):
 class MetricSource(StrictModel):
     """A metric of a run."""
 
-    run: str
-    metric: str
+    run: RunName
+    metric: MetricKey
 
 
 class DerivedSpec(StrictModel):
@@ -223,7 +238,9 @@ class DerivedSpec(StrictModel):
     )
     expression: ExpressionField | None = None
     of: dict[str, MetricSource] = Field({}, description="Name in the expression -> metric of a run")
-    rank_correlation: str | None = Field(None, description="Grid whose order is compared with the paper's")
+    rank_correlation: Annotated[str | None, NameOf("grid")] = Field(
+        None, description="Grid whose order is compared with the paper's"
+    )
     only: dict[str, Alternatives] = Field(
         {}, description="Rows or columns of the grid -> those of their values that count"
     )
@@ -250,8 +267,8 @@ class DerivedSpec(StrictModel):
 class MetricReference(StrictModel):
     """A metric of another run as a bound."""
 
-    run: str
-    metric: str
+    run: RunName
+    metric: MetricKey
     times: float = 1.0
 
 
@@ -274,9 +291,11 @@ class Condition(StrictModel):
 
     model_config = ConfigDict(json_schema_extra=exactly_one(*SYMBOLS))
 
-    run: str = Field("", description="Name of a run; with `*` every run that matches; default: every run")
-    metric: str = ""
-    derived: str = Field("", description="Key of `derived`, in place of run and metric")
+    run: Annotated[str, NameOf("runs")] = Field(
+        "", description="Name of a run; with `*` every run that matches; default: every run"
+    )
+    metric: MetricKey = ""
+    derived: DerivedKey = Field("", description="Key of `derived`, in place of run and metric")
     above: Bound | None = None
     at_least: Bound | None = None
     below: Bound | None = None
@@ -325,7 +344,7 @@ class Claim(Assertion):
     short: str = Field("", description="The same for the table of runs, e.g. '> 100 %'")
     source: str = Field("", description="Where it is in the paper: section, figure, table")
     note: str = Field("", description="What a reader should know about the verdict")
-    open_values: list[str] | None = Field(
+    open_values: Annotated[list[str] | None, NameOf("open value")] = Field(
         None, description="Open values of the region that it depends on; default: all that affect its runs"
     )
     _number: int | None = PrivateAttr(None)
@@ -338,4 +357,4 @@ class Claim(Assertion):
 class LimitSpec(Assertion):
     """The largest value of an axis up to which all conditions hold, for each setting of the others."""
 
-    of: str = Field(description="The axis; its values must be numbers")
+    of: Annotated[str, NameOf("axis")] = Field(description="The axis; its values must be numbers")

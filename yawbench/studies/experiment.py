@@ -246,9 +246,8 @@ def experiment_of(
     spec = made(ExperimentSpec, **keys, axes={} if design else axes or {})
     if design:  # its points are not those of all axes
         spec = spec.model_copy(update={"axes": axes or {}})
-    experiment = LoadedExperiment(path, spec, named, (), tuple(changes), tuple(design), origin)
-    refuse(problems_of(experiment))
-    return experiment
+    refuse(problems_of(spec, named))
+    return LoadedExperiment(path, spec, named, (), tuple(changes), tuple(design), origin)
 
 
 @dataclass(frozen=True)

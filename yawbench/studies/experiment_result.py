@@ -8,7 +8,7 @@ from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from yawbench.foundation.errors import Diagnostic, ResultsError
 from yawbench.foundation.messages import counted
@@ -29,7 +29,6 @@ from .region_verdicts import Region
 from .schema import ExperimentSpec
 from .sections import sections
 
-K = TypeVar("K")
 Each = Callable[..., Iterable[Any]]
 """`map`, or a parallel equivalent such as `Pool.map`."""
 

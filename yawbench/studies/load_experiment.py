@@ -102,7 +102,7 @@ def load_experiment(path: Path | str, *, changes: Sequence[Override] = ()) -> Lo
     own = changes_of_file(spec, path.parent, "sweep" if spec.axes else "study")
     for_all = tuple(change for change in own if change.target not in overridden)
     experiment = LoadedExperiment(path, spec, runs, for_all, tuple(overridden.values()))
-    for problem in problems_of(experiment) if not document.errors else ():
+    for problem in problems_of(spec, runs) if not document.errors else ():
         document.report(*problem)
     document.raise_errors()
     _ = experiment.loaded_sections  # a mistake in a file that they name is told before the runs are made

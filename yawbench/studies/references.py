@@ -6,8 +6,11 @@ library are called alike.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from fnmatch import fnmatchcase
+from typing import Any, NamedTuple
+
+from pydantic import BaseModel
 
 from yawbench.foundation.errors import Diagnostic, Location, ScenarioError
 from yawbench.foundation.messages import hint
@@ -15,13 +18,13 @@ from yawbench.orchestrator.scenario.yaml_lines import KeyPath, dotted
 from yawbench.orchestrator.signal_names import Target
 
 from .axes import RUN, levels_of, names_of
-from .claim_schema import Condition, MetricReference, text_of
+from .claim_schema import NameOf, text_of
 from .derived import cells
 from .schema import ExperimentSpec, FigureSpec
 from .sections import sections
 
-if TYPE_CHECKING:
-    from .experiment import LoadedExperiment
+Reference = tuple[str, str, KeyPath]
+"""What is named (`NameOf.kind`), its name, and the key of that."""
 
 
 class Problem(NamedTuple):
@@ -45,15 +48,14 @@ COLUMNS = (RUN, "status", "reason", "warnings", "key")
 """Columns of the table besides axes and metrics."""
 
 
-def problems_of(experiment: LoadedExperiment) -> list[Problem]:
-    """Return all mistakes; that a figure leaves an axis out only if there is no other."""
-    spec = experiment.spec
+def problems_of(spec: ExperimentSpec, runs: Collection[str]) -> list[Problem]:
+    """Return all mistakes in an experiment with these named runs."""
     found = [
-        *_in_axes(spec), *_in_names(experiment), *_in_correlations(spec), *_in_limits(spec),
+        *_in_axes(spec), *_in_names(spec, runs), *_in_correlations(spec), *_in_limits(spec),
         *_in_sections(spec),
     ]  # fmt: skip
     for i, figure in enumerate(spec.figures):
-        problems = problems_of_figure(experiment, figure)
+        problems = problems_of_figure(spec, runs, figure)
         if figure.name in [other.name for other in spec.figures[:i]]:
             already = f"there is already a figure {figure.name!r}"
             problems.insert(0, Problem(("name",), already, "name-duplicate"))
@@ -61,37 +63,57 @@ def problems_of(experiment: LoadedExperiment) -> list[Problem]:
     return found
 
 
-def problems_of_figure(experiment: LoadedExperiment, figure: FigureSpec) -> list[Problem]:
+def problems_of_figure(spec: ExperimentSpec, runs: Collection[str], figure: FigureSpec) -> list[Problem]:
     """Return the mistakes of a figure, with keys in it; that it leaves an axis out if there is no other."""
-    spec = experiment.spec
-    names: list[tuple[str, str, KeyPath]] = [
-        ("axis", axis, (key,)) for key, axis in figure.axes.items() if axis != RUN or not spec.runs
-    ]
-    names += [("axis", axis, ("only", axis)) for axis in figure.only]
-    names += [
-        (what, name, (what,)) for what in ("metric", "limit", "grid") if (name := getattr(figure, what))
-    ]
-    return [*_unknown(experiment, names), *_in_figure(spec, figure)] or [*_left_out(spec, figure)]
+    names = [*named_in(figure)]
+    if figure.panel_axis:
+        names.append(("axis or run", figure.panel_axis, ("panels",)))
+    return [*_unknown(spec, runs, names), *_in_figure(spec, figure)] or [*_left_out(spec, figure)]
+
+
+def named_in(part: Any, key: KeyPath = ()) -> Iterator[Reference]:
+    """Yield what the fields of a part of an experiment name, as their schema marks it (`NameOf`)."""
+    if not isinstance(part, BaseModel):
+        for k, inner in part.items() if isinstance(part, dict) else enumerate(part):
+            if isinstance(inner, (BaseModel, dict, list)):
+                yield from named_in(inner, (*key, k))
+        return
+    for field, about in type(part).model_fields.items():
+        given, where = getattr(part, field), (*key, about.alias or field)
+        kind = next((mark.kind for mark in about.metadata if isinstance(mark, NameOf)), "")
+        if kind and isinstance(given, str):
+            yield from [(kind, given, where)] if given else ()
+        elif kind:
+            pairs = zip(given, given, strict=True) if isinstance(given, dict) else enumerate(given or ())
+            yield from ((kind, name, (*where, k)) for k, name in pairs)
+        elif isinstance(given, (BaseModel, dict, list)):
+            yield from named_in(given, where)
 
 
 def _unknown(
-    experiment: LoadedExperiment, references: Iterable[tuple[str, str, KeyPath]]
+    spec: ExperimentSpec, runs: Collection[str], references: Iterable[Reference]
 ) -> Iterator[Problem]:
-    """Yield the references, (kind, name, key), to what does not exist."""
-    spec = experiment.spec
-    known: dict[str, tuple[Mapping[str, object], str]] = {
-        "run": (experiment.runs, "runs"),
+    """Yield the references to what does not exist."""
+    known: dict[str, tuple[Collection[str], str]] = {
+        "run": (runs, "runs"),
         "metric": (spec.metrics, "metrics"),
         "axis": (spec.axes, "axes"),
+        "axis or run": ([*spec.axes, *([RUN] if spec.runs else [])], "axes"),
         "derived number": (spec.derived, "there are"),
         "grid": (spec.grids, "grids"),
         "limit": (spec.limits, "limits"),
         "open value": (spec.region.open_values if spec.region else {}, "open values"),
     }
     for what, name, key in references:
+        if what == "runs":
+            if not any(fnmatchcase(run, name) for run in runs):
+                guess = hint(name, runs, lead="runs")
+                yield Problem(key, f"no run is named {name!r}{guess}", "name-unknown")
+            continue
         names, lead = known[what]
         if name not in names:
-            yield Problem(key, f"there is no {what} {name!r}{hint(name, names, lead=lead)}", "name-unknown")
+            guess = hint(name, names, lead=lead)
+            yield Problem(key, f"there is no {what.removesuffix(' or run')} {name!r}{guess}", "name-unknown")
 
 
 def _in_axes(spec: ExperimentSpec) -> Iterator[Problem]:
@@ -116,77 +138,20 @@ def _in_sections(spec: ExperimentSpec) -> Iterator[Problem]:
             yield Problem((section,), "is about named runs, not about runs along axes")
 
 
-def _in_names(experiment: LoadedExperiment) -> Iterator[Problem]:
-    """Yield references to runs, metrics, axes or numbers that do not exist."""
-    yield from _unknown(experiment, _names(experiment.spec))
-    for key, condition in experiment.spec.conditions():
-        if not (condition.derived or condition.run) and experiment.spec.runs and key[0] != "limits":
+def _in_names(spec: ExperimentSpec, runs: Collection[str]) -> Iterator[Problem]:
+    """Yield references to runs, metrics, axes or numbers that do not exist, but for those of figures."""
+    for field in type(spec).model_fields:
+        if field not in ("figures", "claims", "checks"):
+            yield from _unknown(spec, runs, named_in({field: getattr(spec, field)}))
+    for group, number, claim in spec.assertions():
+        yield from _unknown(spec, runs, named_in(claim, (group, number)))
+    for key, condition in spec.conditions():
+        if not (condition.derived or condition.run) and spec.runs and key[0] != "limits":
             yield Problem(key, "needs run and metric, or derived in place of both", "figure-invalid")
-        else:
-            yield from _unknown(experiment, _names_in(experiment, key, condition))
-    for patterns, key in _patterns(experiment.spec):
-        for k, pattern in enumerate(patterns):
-            if not experiment.matching([pattern]):
-                guess = hint(pattern, experiment.runs, lead="runs")
-                yield Problem((*key, "runs", k), f"no run is named {pattern!r}{guess}", "name-unknown")
-
-
-def _names(spec: ExperimentSpec) -> Iterator[tuple[str, str, KeyPath]]:
-    """Yield (kind, name, key) of all references except patterns of runs."""
-    for i, table in enumerate(spec.tables):
-        for k, name in enumerate(table.metrics):
-            yield "metric", name, ("tables", i, "metrics", k)
     for name, grid in spec.grids.items():
-        for cell in cells(grid):
-            what, named = ("derived number", cell.metric) if grid.derived else ("run", cell.run)
-            yield what, named, ("grids", name)
-        if grid.metric:
-            yield "metric", grid.metric, ("grids", name, "metric")
-    for name, number in spec.derived.items():
-        for word, source in number.of.items():
-            yield "run", source.run, ("derived", name, "of", word, "run")
-            yield "metric", source.metric, ("derived", name, "of", word, "metric")
-        if number.rank_correlation is not None:
-            yield "grid", number.rank_correlation, ("derived", name, "rank_correlation")
-    for group, i, claim in spec.assertions():
-        for k, name in enumerate(claim.open_values or ()):
-            yield "open value", name, (group, i, "open_values", k)
-    if spec.tuning:
-        yield "derived number", spec.tuning.objective, ("tuning", "objective")
-    for section in sections():
-        for i, entry in enumerate(getattr(spec, section, ())):
-            yield "run", entry.run, (section, i, "run")
-    for name, limit in spec.limits.items():
-        yield "axis", limit.of, ("limits", name, "of")
-
-
-def _names_in(
-    experiment: LoadedExperiment, key: KeyPath, condition: Condition
-) -> Iterator[tuple[str, str, KeyPath]]:
-    """Yield the references in a condition likewise; a run may be a pattern."""
-    if condition.derived:
-        yield "derived number", condition.derived, (*key, "derived")
-        return
-    if condition.run and not experiment.matching([condition.run]):
-        yield "run", condition.run, (*key, "run")
-    yield "metric", condition.metric, (*key, "metric")
-    if isinstance(condition.bound, MetricReference):
-        yield "run", condition.bound.run, (*key, condition.relation, "run")
-        yield "metric", condition.bound.metric, (*key, condition.relation, "metric")
-
-
-def _patterns(spec: ExperimentSpec) -> Iterator[tuple[Sequence[str], KeyPath]]:
-    """Yield (patterns of runs, key of the part that has them)."""
-    for name, axis in spec.axes.items():
-        yield axis.runs, ("axes", name)
-    for i, table in enumerate(spec.tables):
-        yield table.runs, ("tables", i)
-    for name, open_value in spec.region.open_values.items() if spec.region else ():
-        yield open_value.runs, ("region", "open_values", name)
-    if spec.tuning:
-        yield spec.tuning.runs, ("tuning",)
-    for i, figure in enumerate(spec.figures):
-        yield figure.runs, ("figures", i)
+        what = "derived number" if grid.derived else "run"
+        cell_names = (cell.metric if grid.derived else cell.run for cell in cells(grid))
+        yield from _unknown(spec, runs, ((what, one, ("grids", name)) for one in cell_names))
 
 
 def _in_correlations(spec: ExperimentSpec) -> Iterator[Problem]:

@@ -26,10 +26,10 @@ KIND = "section of a study"
 
 @dataclass(frozen=True)
 class Section:
-    """A list of entries, each about the named run in its key `run`.
+    """A list of entries, each about a named run.
 
     Attributes:
-        entry: schema of an entry.
+        entry: schema of an entry; `claim_schema.RunName` marks the name of its run.
         says: description of the section.
         load: reads the files that entries name, relative to a folder; its errors are told before any run.
         compare: returns findings on the runs that have results, from these and what was loaded; a finding has
