@@ -89,5 +89,5 @@ def test_what_is_listed_is_there():
 
 
 def test_what_a_missing_part_makes_is_refused_in_a_sentence():
-    with refused(ScenarioError, "part-missing", names=("nothing", "judge of a study")):
-        plugins.require("judge of a study", "nothing")
+    with refused(ScenarioError, "part-missing", names=("nothing", "section of a study")):
+        plugins.require("section of a study", "nothing")

@@ -15,15 +15,12 @@ from typing import NamedTuple
 
 from tests.checkout import ROOT
 from yawbench.foundation.messages import listed
+from yawbench.metrics.verdict import Status, worded
 from yawbench.studies.confidence import Bounds
 from yawbench.studies.experiment import LoadedExperiment
 from yawbench.studies.load_experiment import found_studies, load_experiment
 from yawbench.studies.result_tables import (
-    FAILS,
-    HOLDS,
     NO_FLIP,
-    SENSITIVE,
-    UNDECIDED,
     flip_words,
     share,
     share_words,
@@ -46,7 +43,9 @@ reason for each, are in the study files and in `results/report.html`.
 
 *A test makes all these runs and checks this page.*
 """
-KINDS = (HOLDS, FAILS["claims"], SENSITIVE, UNDECIDED)
+KINDS = tuple(
+    worded(status, "claims") for status in (Status.PASSED, Status.FAILED, Status.SENSITIVE, Status.UNDECIDED)
+)
 
 
 class Row(NamedTuple):

@@ -10,23 +10,26 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from yawbench.fmus.fmu import Value
-from yawbench.foundation.errors import Diagnostic, Location, ScenarioError
-from yawbench.foundation.messages import hint, listed, short
+from yawbench.foundation.errors import Diagnostic, ScenarioError
+from yawbench.foundation.messages import short
 from yawbench.metrics.plausibility import PlausibilityWatch
 from yawbench.orchestrator.master.fmi import open_instance
 from yawbench.orchestrator.master.run_lifecycle import OpenInstance
 from yawbench.orchestrator.master.simulate import simulate_in_memory
 from yawbench.orchestrator.results.reader import Results
 from yawbench.orchestrator.scenario.quantities import number_and_unit
-from yawbench.orchestrator.scenario.schema_validation import Model, validate
-from yawbench.orchestrator.scenario.yaml_lines import Document, scalar
-from yawbench.studies.claim_schema import si_number, text_of
+from yawbench.orchestrator.scenario.schema_validation import made
+from yawbench.orchestrator.scenario.yaml_lines import scalar
+from yawbench.studies.axes import DesignAxisSpec, VariantSpec
+from yawbench.studies.claim_schema import MetricSpec, si_number
 from yawbench.studies.experiment import LoadedExperiment as Design
-from yawbench.studies.experiment import NamedRun, metrics_of, plan_experiment
+from yawbench.studies.experiment import NamedRun, experiment_of, metrics_of, plan_experiment
 from yawbench.studies.experiment_result import ExperimentResult
 from yawbench.studies.jobs import Job, Outcome, measured
-from yawbench.studies.result_files import columns_of, draw_over_axes
-from yawbench.studies.schema import ExperimentSpec, FigureSpec
+from yawbench.studies.references import problems_of_figure, refuse
+from yawbench.studies.result_figures import draw_over_axes
+from yawbench.studies.result_files import columns_of
+from yawbench.studies.schema import FigureSpec
 from yawbench.studies.tables import to_pandas
 
 from . import arguments
@@ -71,7 +74,7 @@ def experiment(
     """
     base = arguments.instance(base, "base", Scenario, "yawbench.load")
     axes = arguments.mapping(axes, "axes", "a mapping of axes to levels, {'plant.mass': [900, 1000]}")
-    specs: dict[str, Any] = {}
+    specs: dict[str, DesignAxisSpec] = {}
     changed = base._unswapped(axes)
     for name, levels in axes.items():
         with arguments.as_scenario_errors():
@@ -84,39 +87,30 @@ def experiment(
                 else [("", level) for level in arguments.items(levels, name, "a list of levels")]
             )
         if name in base._loaded.units:
-            variants = {}
+            variants: dict[str, VariantSpec] = {}
             for label, level in pairs:
                 swapped = changed._swapped({name: level}, label)
                 swap, *others = swapped.changes[len(changed.changes) :]
                 words = label or (level if isinstance(level, str) else Path(str(swap.value)).stem)
                 if words in variants:
                     raise ScenarioError(f"{name}: two levels have the name {words!r}", code="name-duplicate")
-                settings = {str(change.target): change.value for change in others}
-                variants[words] = {"swap": {name: str(swap.value)}, "set": settings}
+                settings = {change.target: change.value for change in others}
+                variants[words] = made(VariantSpec, swap={name: str(swap.value)}, set=settings)
                 changed = replace(changed, _programs=swapped._programs)
-            specs[name] = {"variants": variants}
+            specs[name] = made(DesignAxisSpec, f"axes.{name}", variants=variants)
         else:
-            specs[name] = {"vary": name, **numbers_of(name, [level for _, level in pairs])}
+            numbers = numbers_of(name, [level for _, level in pairs])
+            specs[name] = made(DesignAxisSpec, f"axes.{name}", vary=name, **numbers)
     wanted = arguments.texts(metrics, "metrics")
-    spec = {
-        "scenario": base.path.name,
-        "axes": specs,
-        "metrics": {metric: {"metric": metric} for metric in wanted},
-    }
-    design = checked(ExperimentSpec, {"title": base.title or base.path.stem, **spec})
-    run = NamedRun("", "", "", base.path, ())
-    return Experiment(changed, Design(base.path, design, {"": run}, (), changed.changes))
-
-
-def checked(model: type[Model], fields: dict[str, Any]) -> Model:
-    """Validate data against a schema; all errors are raised together."""
-    document = Document(Path(), fields)
-    made = validate(model, document)
-    if made is None:
-        raise ScenarioError([
-            replace(error, location=Location(target=error.location.target)) for error in document.errors
-        ], code="argument-invalid")  # fmt: skip
-    return made
+    design = experiment_of(
+        base.path,
+        [NamedRun("", "", "", base.path, ())],
+        changes=changed.changes,
+        axes=specs,
+        title=base.title or base.path.stem,
+        metrics={name: made(MetricSpec, f"metrics.{name}", metric=name) for name in wanted},
+    )
+    return Experiment(changed, design)
 
 
 def numbers_of(name: str, items: Iterable[Any]) -> dict[str, Any]:
@@ -285,44 +279,28 @@ class Runs:
             ScenarioError: an axis or metric is unknown, or an axis is not used.
             ResultsError: no run has a value.
         """
-        spec = self._findings.spec
         metric, x = arguments.text(metric, "metric"), arguments.text(x, "x")
-        y, lines, panels = (
-            arguments.text(axis, name, empty=True)
-            for name, axis in (("y", y), ("lines", lines), ("panels", panels))
+        given = (("y", y), ("lines", lines), ("panels", panels))
+        others = {key: text for key, axis in given if (text := arguments.text(axis, key, empty=True))}
+        levels = (
+            {} if only is None else arguments.mapping(only, "only", "a mapping of axes to lists of levels")
         )
-        for name in filter(None, (x, y, lines, panels)):
-            if name not in spec.axes:
-                raise ScenarioError(
-                    f"there is no axis {name!r}{hint(name, spec.axes, lead='axes')}", code="axis-unknown"
-                )
-        if metric not in spec.metrics:
-            raise ScenarioError(
-                f"there is no metric {metric!r}{hint(metric, spec.metrics, lead='metrics')}",
-                code="metric-unknown",
-            )
-        if left := [name for name in spec.axes if name not in (x, y, lines, panels, *_axes_of(only))]:
-            raise ScenarioError(
-                f"the axis {left[0]!r} is not used in this figure: assign it to lines or panels",
-                code="argument-invalid",
-            )
-        chosen = {
-            "title": arguments.text(title, "title", empty=True),
-            "scale": arguments.text(scale, "scale"),
-            "largest": self._limit("largest", largest, metric),
-            "mark": self._limit("mark", mark, metric),
-            "only": {axis: self._levels_of(axis, levels) for axis, levels in _axes_of(only).items()},
-        }
-        places = {key: value for key, value in (("y", y), ("lines", lines), ("panels", panels)) if value}
-        settings = {
-            "name": "figure",
-            "kind": "map" if y else "curve",
-            "metric": metric,
-            "x": x,
-            **places,
-            **chosen,
-        }
-        return shown_in_notebooks(draw_over_axes(self._findings, checked(FigureSpec, settings)))
+        spec = made(
+            FigureSpec,
+            name="figure",
+            kind="map" if "y" in others else "curve",
+            metric=metric,
+            x=x,
+            **others,
+            title=arguments.text(title, "title", empty=True),
+            scale=arguments.text(scale, "scale"),
+            largest=self._limit("largest", largest, metric),
+            mark=self._limit("mark", mark, metric),
+            only={axis: _levels_of(axis, chosen) for axis, chosen in levels.items()},
+        )
+        experiment = self._findings.experiment
+        refuse(problems_of_figure(experiment.spec, experiment.runs, spec))
+        return shown_in_notebooks(draw_over_axes(self._findings, spec))
 
     def _limit(self, name: str, value: float | str | None, metric: str) -> Value | None:
         """Return a value on the metric's scale as plain Python."""
@@ -334,21 +312,6 @@ class Runs:
                 raise ValueError(f"must be between {-FAR:g} and {FAR:g} (got {short(converted)})")
         return converted
 
-    def _levels_of(self, axis: str, levels: Any) -> list[Any]:
-        """Return the levels of an axis that a figure is restricted to."""
-        spec, name = self._findings.spec, f"only[{axis!r}]"
-        if axis not in spec.axes:
-            raise ScenarioError(
-                f"only: there is no axis {axis!r}{hint(axis, spec.axes, lead='axes')}", code="axis-unknown"
-            )
-        wanted = numbers_of(name, arguments.items(levels, name, "a list of levels"))["values"]
-        known = [text_of(level) for level in spec.axes[axis].variants or spec.axes[axis].values or ()]
-        unknown = [text_of(level) for level in wanted if text_of(level) not in known]
-        if unknown or not wanted:
-            wrong = f"there is no level {unknown[0]!r}" if unknown else "give at least one level"
-            raise ScenarioError(f"{name}: {wrong}; levels: {listed(known)}", code="axis-unknown")
-        return list(wanted)
-
     def __repr__(self) -> str:
         result, warning = self._findings, self._findings.remarkable()
         noted = f"; {warning}" if warning else ""
@@ -358,5 +321,7 @@ class Runs:
         return str(self.table.drop(columns="key").to_html(index=False, na_rep=""))
 
 
-def _axes_of(only: Any) -> dict[str, Any]:
-    return {} if only is None else arguments.mapping(only, "only", "a mapping of axes to lists of levels")
+def _levels_of(axis: str, levels: Any) -> list[Any]:
+    """Return the levels of an axis that a figure is restricted to."""
+    name = f"only[{axis!r}]"
+    return list(numbers_of(name, arguments.items(levels, name, "a list of levels"))["values"])

@@ -2,28 +2,29 @@
 
 from __future__ import annotations
 
-import contextlib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from yawbench.fmus.fmu import Value
-from yawbench.foundation.errors import Diagnostic, Location, ResultsError, ScenarioError
+from yawbench.foundation.errors import Diagnostic, ResultsError, ScenarioError
 from yawbench.foundation.messages import counted, listed, short
-from yawbench.metrics.expressions import metric
+from yawbench.orchestrator.scenario.schema_validation import made
 from yawbench.studies.axes import AxisSpec
+from yawbench.studies.claim_schema import DerivedSpec, MetricSource, MetricSpec
 from yawbench.studies.experiment import LoadedExperiment as Design
-from yawbench.studies.experiment import NamedRun
+from yawbench.studies.experiment import NamedRun, experiment_of
 from yawbench.studies.experiment_result import ExperimentResult
-from yawbench.studies.schema import ExperimentSpec
+from yawbench.studies.expression import Expression
+from yawbench.studies.schema import LawSpec, TuningSpec
 from yawbench.studies.tables import to_pandas
 from yawbench.studies.tuning import TunedLaw, columns_of, history_figure, search
 
 from . import arguments
 from ._controller import PythonComponent
-from ._experiment import checked, executed, numbers_of
+from ._experiment import executed, numbers_of
 from ._progress import bar
 from ._run import shown_in_notebooks
 from ._scenario import Scenario, warn
@@ -79,19 +80,20 @@ def tune(
     """
     bases = _bases(base)
     weights = _weights(objective)
-    settings: dict[str, Any] = {
-        "population": arguments.count(population, "population", least=5),
-        "generations": arguments.count(generations, "generations"),
-        "seed": arguments.count(seed, "seed", least=0, most=2**32 - 1),
-        "objective": OBJECTIVE,
-        "laws": {OBJECTIVE: {"axes": _axes(ranges)}},
-    }
+    tuning = made(
+        TuningSpec,
+        population=arguments.count(population, "population", least=5),
+        generations=arguments.count(generations, "generations"),
+        seed=arguments.count(seed, "seed", least=0, most=2**32 - 1),
+        objective=OBJECTIVE,
+        laws={OBJECTIVE: made(LawSpec, axes=_axes(ranges))},
+    )
     workers = None if workers is None else arguments.count(workers, "workers")
     progress = None if progress is None else arguments.flag(progress, "progress")
-    design = _design(bases, weights, settings)
+    design = _design(bases, weights, tuning)
     programs = _programs(bases)
     generations_done: list[ExperimentResult] = []
-    total = len(bases) * settings["population"] * settings["generations"]
+    total = len(bases) * tuning.population * tuning.generations
     with bar(f"Tune {design.spec.title}", total, wanted=progress) as shown:
 
         def judged(trials: Design) -> ExperimentResult:
@@ -128,8 +130,8 @@ def _weights(objective: Any) -> dict[str, float]:
     return {name: arguments.number(weight, f"objective[{name!r}]") for name, weight in weights.items()}
 
 
-def _axes(ranges: Any) -> dict[str, Any]:
-    """Return the ranges as axes of a tuning file."""
+def _axes(ranges: Any) -> dict[str, AxisSpec]:
+    """Return the ranges as axes of a tuning."""
     wanted = "a mapping of targets to ranges, {'controller.gain': (1e3, 1e5)}"
     axes = {}
     for name, ends in arguments.mapping(ranges, "ranges", wanted).items():
@@ -144,54 +146,39 @@ def _axes(ranges: Any) -> dict[str, Any]:
             )
         numbers = numbers_of(place, parts[:2])
         low, high = numbers.pop("values")
-        axes[name] = {"vary": name, "from": low, "to": high, "spacing": spacing, **numbers}
-        with _located(place):
-            checked(AxisSpec, axes[name])
+        between = {"from": low, "to": high, "spacing": spacing}
+        axes[name] = made(AxisSpec, place, vary=name, **between, **numbers)
     if not axes:
         raise ValueError("ranges: must have at least one target")
     return axes
 
 
-@contextlib.contextmanager
-def _located(argument: str) -> Iterator[None]:
-    """Name the argument in errors about its content."""
-    try:
-        yield
-    except ScenarioError as error:
-        where = Location(target=argument)
-        raise ScenarioError([replace(each, location=where) for each in error.diagnostics]) from None
-
-
-def _design(bases: list[Scenario], weights: Mapping[str, float], settings: dict[str, Any]) -> Design:
+def _design(bases: list[Scenario], weights: Mapping[str, float], tuning: TuningSpec) -> Design:
     """Return the tuning as an experiment: a named run per scenario, their mean as the objective."""
-    for name in weights:
-        with _located("objective"):
-            metric(name)
-    runs = {
-        f"s{k}": NamedRun(f"s{k}", each.title, each.title, each.path, each.changes)
-        for k, each in enumerate(bases)
-    }
-    sources = {
-        f"{run}_m{i}": ({"run": run, "metric": name}, weight)
+    runs = [
+        NamedRun(f"s{k}", each.title, each.title, each.path, each.changes) for k, each in enumerate(bases)
+    ]
+    terms = {
+        f"{run.name}_m{i}": (made(MetricSource, run=run.name, metric=name), weight)
         for run in runs
         for i, (name, weight) in enumerate(weights.items())
     }
-    terms = " + ".join(f"({weight!r}) * {name}" for name, (_, weight) in sources.items())
+    first, *others = (weight * Expression.named(name) for name, (_, weight) in terms.items())
     words = " + ".join(name if weight == 1.0 else f"{weight:g} {name}" for name, weight in weights.items())
-    spec = {
-        "title": bases[0].title or bases[0].path.stem,
-        "runs": [{"name": name, "scenario": run.scenario.name} for name, run in runs.items()],
-        "metrics": {name: {"metric": name} for name in weights},
-        "derived": {
-            OBJECTIVE: {
-                "says": words + (f", mean of {len(runs)} scenarios" if len(runs) > 1 else ""),
-                "expression": f"({terms}) / {len(runs)}",
-                "of": {name: source for name, (source, _) in sources.items()},
-            }
-        },
-        "tuning": settings,
-    }
-    return Design(bases[0].path, checked(ExperimentSpec, spec), runs)
+    objective = made(
+        DerivedSpec,
+        says=words + (f", mean of {len(runs)} scenarios" if len(runs) > 1 else ""),
+        expression=sum(others, first) / len(runs),
+        of={name: source for name, (source, _) in terms.items()},
+    )
+    return experiment_of(
+        bases[0].path,
+        runs,
+        title=bases[0].title or bases[0].path.stem,
+        metrics={name: made(MetricSpec, "objective", metric=name) for name in weights},
+        derived={OBJECTIVE: objective},
+        tuning=tuning,
+    )
 
 
 def _programs(bases: list[Scenario]) -> dict[Path, PythonComponent]:

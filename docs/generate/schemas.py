@@ -18,6 +18,8 @@ from yawbench.orchestrator.signal_names import SignalName, Target
 from yawbench.ranking import ranking as ranking
 from yawbench.ranking import threats as threats
 from yawbench.studies import schema as experiment
+from yawbench.studies.expression import Expression
+from yawbench.studies.load_experiment import ExperimentFile
 
 from .text import NOTE, cell, code, docstring, table
 
@@ -39,7 +41,7 @@ def scenario_page() -> str:
 
 def experiment_page() -> str:
     """Return the page of studies and sweeps."""
-    return _page("Study and sweep files", experiment, [experiment.ExperimentSpec])
+    return _page("Study and sweep files", experiment, [ExperimentFile])
 
 
 def ranking_page() -> str:
@@ -102,6 +104,7 @@ def _default(field: FieldInfo) -> str:
 
 _WORDS = {
     str: "text",
+    Expression: "text",
     int: "whole number",
     float: "number",
     bool: "true or false",

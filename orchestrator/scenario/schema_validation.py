@@ -5,14 +5,15 @@ from __future__ import annotations
 import types
 import typing
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
+from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, PlainSerializer, PlainValidator, ValidationError, WithJsonSchema
 from pydantic_core.core_schema import no_info_after_validator_function
 
-from yawbench.foundation.errors import code_of
+from yawbench.foundation.errors import Location, ScenarioError, code_of
 from yawbench.foundation.messages import closest, listed, short
 
 from .quantities import instant, quantity_pattern, seconds
@@ -131,6 +132,26 @@ def validated(model: type[Model], document: Document) -> Model:
     content = validate(model, document)
     document.raise_errors()
     assert content is not None, "without content there is an error"
+    return content
+
+
+def made(model: type[Model], argument: str = "", /, **fields: Any) -> Model:
+    """Create a specification in Python.
+
+    Args:
+        model: the schema.
+        argument: what it is made of, named by errors.
+        fields: by the keys of a file; parts may be specifications that are made already.
+
+    Raises:
+        ScenarioError: it is invalid; lists all errors.
+    """
+    document = Document(Path(), fields)
+    content = validate(model, document)
+    if content is None:
+        located = ((one, ".".join(filter(None, (argument, one.location.target)))) for one in document.errors)
+        errors = [replace(one, location=Location(target=place)) for one, place in located]
+        raise ScenarioError(errors, code="argument-invalid")
     return content
 
 

@@ -20,7 +20,7 @@ from yawbench.fmus.build import find_components
 from yawbench.foundation.messages import fold
 from yawbench.metrics.measures import MEASURES
 from yawbench.orchestrator.scenario.schema import ScenarioSpec
-from yawbench.studies.schema import ExperimentSpec
+from yawbench.studies.load_experiment import ExperimentFile
 from yawbench.vocabulary.signals import SIGNALS
 
 
@@ -115,7 +115,7 @@ def test_the_reference_of_commands_tells_every_option(site):
                 assert parameter.opts[0] in section, f"{name} {parameter.opts[0]}"
 
 
-@pytest.mark.parametrize(("page", "root"), [("scenario", ScenarioSpec), ("experiment", ExperimentSpec)])
+@pytest.mark.parametrize(("page", "root"), [("scenario", ScenarioSpec), ("experiment", ExperimentFile)])
 def test_the_references_of_files_tell_every_key(site, page, root):
     html = text_of(site, f"reference/{page}.html")
     models = schemas.reachable([root])

@@ -19,13 +19,14 @@ from yawbench.figures.style import save
 from yawbench.foundation.errors import Diagnostic, ScenarioError
 from yawbench.metrics.expressions import MetricValue
 from yawbench.reports.comparison import BEST, comparison_facts, metric_table
-from yawbench.studies import result_files
+from yawbench.studies import result_figures
 from yawbench.studies.claim_schema import MetricSpec
+from yawbench.studies.comparison import FIGURE_SPECS, comparison_table, variants
 from yawbench.studies.experiment import NamedRun, experiment_of
 from yawbench.studies.experiment_result import judge_results
 from yawbench.studies.jobs import Job, Outcome
-from yawbench.studies.result_files import draw_all, write_findings
-from yawbench.studies.scenario_experiments import FIGURE_SPECS, comparison_table, variants
+from yawbench.studies.result_figures import draw_all
+from yawbench.studies.result_files import write_findings
 from yawbench.studies.schema import ExperimentSpec
 
 from .recorded import car, write
@@ -182,7 +183,7 @@ def test_the_table_has_a_row_per_metric_and_a_column_per_run(findings):
 
 
 def test_a_run_that_failed_is_named_and_the_others_are_drawn(findings, tmp_path, monkeypatch):
-    monkeypatch.setattr(result_files, "save", partial(save, kinds=["svg"]))
+    monkeypatch.setattr(result_figures, "save", partial(save, kinds=["svg"]))
     drawn, problems = draw_all(findings, tmp_path)
     assert (list(drawn), problems) == (["overview", "wheel_torques"], [])
     write_findings(findings, drawn, tmp_path)

@@ -12,16 +12,16 @@ import pytest
 from tests.changed import changed
 from tests.refusals import mentions, refused
 from yawbench.foundation.errors import Diagnostic, ResultsError, ScenarioError
-from yawbench.studies.experiment import NamedRun, experiment_of
-from yawbench.studies.experiment_result import judge_results
-from yawbench.studies.jobs import Job, Outcome
-from yawbench.studies.scenario_experiments import (
+from yawbench.studies.convergence import (
     columns_of,
     convergence_figure,
     convergence_table,
     measure,
     refinements,
 )
+from yawbench.studies.experiment import NamedRun, experiment_of
+from yawbench.studies.experiment_result import judge_results
+from yawbench.studies.jobs import Job, Outcome
 from yawbench.studies.tables import to_csv
 
 from .recorded import results, write

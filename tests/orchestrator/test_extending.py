@@ -29,7 +29,7 @@ from yawbench.studies.experiment import PlannedExperiment
 from yawbench.studies.experiment_result import ExperimentResult
 from yawbench.studies.jobs import Job, MeasuredRun
 from yawbench.studies.load_experiment import load_experiment
-from yawbench.studies.result_files import draw_all
+from yawbench.studies.result_figures import draw_all
 from yawbench.studies.schema import FIGURE_KINDS, FigureKind
 
 from .fakes import Clock, Stage, Witness, make_plan

@@ -19,7 +19,7 @@ from yawbench.orchestrator.results import run_folder as module
 from yawbench.orchestrator.results.folder_lock import FolderLock, holder_of, writing
 from yawbench.orchestrator.results.reader import found_runs, load_results
 from yawbench.orchestrator.results.salvage import lost_format, salvage
-from yawbench.studies.tables import runs_table
+from yawbench.studies.listings import runs_table
 
 from .fakes import Clock, Function, Stage, make_plan
 

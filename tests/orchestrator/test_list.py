@@ -14,7 +14,7 @@ from yawbench.orchestrator.results.run_folder import RunStatus
 from yawbench.orchestrator.results.run_record import FmuRecord, RunRecord
 from yawbench.orchestrator.scenario.loader import title_of
 from yawbench.reports.comparison import differences
-from yawbench.studies.tables import runs_table
+from yawbench.studies.listings import runs_table
 
 from .recorded import car, write
 

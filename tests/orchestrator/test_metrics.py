@@ -30,8 +30,8 @@ from yawbench.orchestrator.results.reader import Results
 from yawbench.orchestrator.results.run_record import ConnectionRecord, FmuRecord, RunRecord
 from yawbench.proving_ground.standard_tests import Evaluation
 from yawbench.reports.comparison import divergence, partings_table
-from yawbench.studies.result_tables import run_table
-from yawbench.studies.tables import metrics_of_run
+from yawbench.studies.evaluation_tables import run_table
+from yawbench.studies.listings import metrics_of_run
 from yawbench.vocabulary.wheels import WHEELS
 
 from .recorded import UNITS, car, noted, results

@@ -15,16 +15,17 @@ from tests.refusals import mentions, refused
 from yawbench.cli import main
 from yawbench.foundation.errors import Diagnostic, ScenarioError
 from yawbench.metrics.expressions import MetricValue
-from yawbench.metrics.verdict import Status, Verdict, compare, not_judged, worst
+from yawbench.metrics.verdict import Status, Verdict, all_of, compare, not_judged, worst
 from yawbench.planner import Planner
 from yawbench.studies.claim_schema import Claim
-from yawbench.studies.claims import Judgement, Region, judge
+from yawbench.studies.claims import judge
 from yawbench.studies.confidence import SequentialTest
 from yawbench.studies.experiment import plan_experiment
 from yawbench.studies.experiment_result import ExperimentResult
 from yawbench.studies.jobs import MeasuredRun
 from yawbench.studies.load_experiment import load_experiment
 from yawbench.studies.open_value_regions import judge_region, next_jobs, plan_region, runs_of
+from yawbench.studies.region_verdicts import Region
 from yawbench.studies.result_tables import region_words, verdict
 
 SCENARIO = """
@@ -267,7 +268,7 @@ def test_the_verdict_on_a_claim_is_that_of_its_deciding_condition_and_a_missing_
     def verdict_on(**bounds):
         conditions = [{"run": "a", "metric": key, "above": bound} for key, bound in bounds.items()]
         claim = Claim.model_validate({"says": "More.", "holds_if": conditions})
-        return judge(claim, values, {"a": ""}).verdict
+        return judge(claim, values, {"a": ""})
 
     near = verdict_on(x=100, y=1)
     assert (near.holds, near.value, near.bound, near.relation, near.unit) == (True, 1.016, 1, "above", "m")
@@ -294,8 +295,8 @@ def test_a_verdict_within_its_confidence_interval_is_not_certain():
     assert compare(1.1, "above", 1.0, half=0.05).certain
     assert not compare(1.1, "above", 1.0, half=0.2).certain
     failing = compare(0.9, "above", 1.0, half=0.2)
-    assert not Judgement(failing, (failing, compare(2.0, "above", 1.0))).certain
-    assert Judgement(failing, (failing, compare(0.5, "above", 1.0))).certain
+    assert not all_of([failing, compare(2.0, "above", 1.0)]).certain
+    assert all_of([failing, compare(0.5, "above", 1.0)]).certain
 
 
 def at_margin(margin: float) -> Verdict:

@@ -19,7 +19,7 @@ from yawbench.studies.experiment import plan_experiment
 from yawbench.studies.experiment_result import judge_records
 from yawbench.studies.jobs import run_job
 from yawbench.studies.load_experiment import load_experiment
-from yawbench.studies.result_files import draw_over_axes
+from yawbench.studies.result_figures import draw_over_axes
 from yawbench.studies.result_tables import limit_tables, run_tables, verdict
 
 SCENARIO = """

@@ -12,10 +12,12 @@ from tests.refusals import each_mentions, mentions, refused
 from yawbench.foundation.errors import Diagnostic, ResultsError
 from yawbench.studies.axis_figures import boundary, edges
 from yawbench.studies.experiment import PlannedExperiment
-from yawbench.studies.experiment_result import ExperimentResult, limit_table, limits_of
+from yawbench.studies.experiment_result import ExperimentResult
 from yawbench.studies.jobs import Job, MeasuredRun, measured
+from yawbench.studies.limits import limit_table, limits_of
 from yawbench.studies.load_experiment import load_experiment
-from yawbench.studies.result_files import columns_of, draw_over_axes, write_table
+from yawbench.studies.result_figures import draw_over_axes
+from yawbench.studies.result_files import columns_of, write_table
 from yawbench.studies.tables import to_pandas
 
 from .fakes import Clock, make_plan

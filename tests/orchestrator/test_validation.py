@@ -260,7 +260,7 @@ def study(tmp_path):
 
 def test_a_study_has_its_validations_in_tables_record_and_answer(study, tmp_path):
     findings = judge_results(study, tmp_path)
-    near, far = findings.validations
+    near, far = findings.sections["validations"]
     assert (near.holds, far.holds) == (True, False)
     assert [verdict.holds for verdict in far.conditions.values()] == [False, True]
     assert (far.bands, near.bands) == ("Wide", load_bands(BANDS).title)

@@ -189,8 +189,8 @@ def test_a_study_has_a_chapter_on_its_validations(chromium: Browser, tmp_path, w
         study_page(chapter(findings, command="yawbench study", stale={}, folder=tmp_path)), "utf-8"
     )
     tree = html.fromstring(unpacked(page))
-    assert len(tree.cssselect("#validations ~ h3")) == len(findings.validations) == 2
-    near, far = findings.validations
+    assert len(tree.cssselect("#validations ~ h3")) == len(findings.sections["validations"]) == 2
+    near, far = findings.sections["validations"]
     assert "2 tests of the car" in tree.text_content()
     assert {near.source, far.source} == {"chosen", near.source}
     chromium.open(page, width=width)

@@ -14,7 +14,7 @@ from tests.studies import check_figures, judge_all, judge_some, verdicts
 from yawbench.figures.style import shown
 from yawbench.metrics.expressions import MetricValue
 from yawbench.orchestrator.results.reader import load_results
-from yawbench.studies.experiment_result import derive
+from yawbench.studies.derived import derive
 from yawbench.studies.jobs import Job, execute
 from yawbench.studies.load_experiment import load_experiment
 

@@ -14,7 +14,7 @@ from yawbench.orchestrator.master.simulate import simulate_in_memory
 from yawbench.orchestrator.results.reader import found_runs, load_results
 from yawbench.orchestrator.scenario.loader import load_scenario
 from yawbench.orchestrator.wiring.make_plan import make_plan
-from yawbench.studies.tables import runs_table
+from yawbench.studies.listings import runs_table
 
 FOLDER = Path(__file__).parents[2] / "scenarios" / "road"
 UNITS = (

@@ -56,9 +56,9 @@ def test_every_row_is_what_the_run_alone_comes_to(base, runs):
 def test_a_metric_is_drawn_over_an_axis_with_a_line_per_level(runs):
     (axes,) = runs.plot("peak(sideslip)", x="plant.initial_speed", lines="controller").axes
     assert [line.get_xdata().tolist() for line in axes.get_lines()] == [[54.0, 90.0], [54.0, 90.0]]
-    with refused(yb.ScenarioError, "argument-invalid", names=("'controller'", "axis", "figure")):
+    with refused(yb.ScenarioError, "figure-invalid", names=("'controller'", "axis", "figure")):
         runs.plot("peak(sideslip)", x="plant.initial_speed")
-    with refused(yb.ScenarioError, "metric-unknown", names=("'peak(sideslp)'", "'peak(sideslip)'")):
+    with refused(yb.ScenarioError, "name-unknown", names=("'peak(sideslp)'", "'peak(sideslip)'")):
         runs.plot("peak(sideslp)", x="plant.initial_speed", lines="controller")
 
 

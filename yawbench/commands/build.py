@@ -171,7 +171,7 @@ def list(options: RunOptions, what: Wanted = None, place: ListedFolder = None, u
     from yawbench.fmus.opener import hidden
     from yawbench.orchestrator.results.reader import found_runs
     from yawbench.orchestrator.scenario import loader
-    from yawbench.studies.tables import (
+    from yawbench.studies.listings import (
         files_table,
         fmus_in,
         fmus_table,

@@ -50,8 +50,10 @@ def conduct(
 def concluded(experiment: LoadedExperiment, execute: Executor, options: RunOptions) -> ExperimentResult:
     """Return the result of an experiment, drawn and written; see `conduct`."""
     from yawbench.orchestrator.scenario.overrides import changed
-    from yawbench.studies.experiment_result import judge_results, kept_cases
-    from yawbench.studies.result_files import draw_all, write_findings
+    from yawbench.studies.experiment_result import judge_results
+    from yawbench.studies.limits import kept_cases
+    from yawbench.studies.result_figures import draw_all
+    from yawbench.studies.result_files import write_findings
 
     if options.quick and experiment.spec.repeats:
         experiment = experiment.short

@@ -282,7 +282,7 @@ def plot(
     from yawbench.figures.panels import check_panels
     from yawbench.figures.plots import OVERVIEW, draw, shown_by, size_of_style
     from yawbench.figures.style import KINDS, LabelledRun, save
-    from yawbench.studies.scenario_experiments import FIGURES
+    from yawbench.studies.comparison import FIGURES
 
     settings = _settings(style, size)
     _check_output(options.out, page, format, bool(settings))

@@ -115,7 +115,7 @@ def run(
     if metrics:
         from yawbench.metrics.expressions import columns_for, evaluate_all
         from yawbench.orchestrator.results.reader import load_results
-        from yawbench.studies.tables import metrics_of_run
+        from yawbench.studies.listings import metrics_of_run
 
         needed = load_results(folder, only=lambda recorded: columns_for(recorded, metrics))
         print_tables([metrics_of_run(needed, metrics)])
@@ -199,7 +199,7 @@ def compare(
     """
     from yawbench.orchestrator.results.folder_names import default_folder
     from yawbench.reports.comparison import comparison_facts
-    from yawbench.studies.scenario_experiments import comparison, comparison_table
+    from yawbench.studies.comparison import comparison, comparison_table
 
     recordings = labelled_recordings(measured, begin)
     folder = options.out or default_folder(scenario, options.changes, suffix="-compare")
@@ -269,7 +269,7 @@ def converge(
     from yawbench.orchestrator.recordings.motion import ANGLES, SPEED_SIGNALS
     from yawbench.orchestrator.results.folder_names import default_folder
     from yawbench.reports.page_parts import image_of
-    from yawbench.studies.scenario_experiments import (
+    from yawbench.studies.convergence import (
         columns_of,
         convergence_figure,
         convergence_table,

@@ -90,7 +90,7 @@ def drive(
     """
     from yawbench.orchestrator.results.folder_names import default_folder
     from yawbench.orchestrator.scenario import loader
-    from yawbench.studies.scenario_experiments import TestDriver
+    from yawbench.studies.driven_tests import TestDriver
 
     chosen = DRIVEN[test]
     changes = (*_vehicle(vehicle), *options.changes)
@@ -126,7 +126,7 @@ def _angle_driven(scenario: Path, changes: Sequence[Override], execute: Executor
         typer.Exit: a run failed.
     """
     from yawbench.proving_ground.steering_tests import characteristic_angle
-    from yawbench.studies.scenario_experiments import TestDriver, slow_steer_runs
+    from yawbench.studies.driven_tests import TestDriver, slow_steer_runs
 
     driver = TestDriver(TESTS["slowly-increasing-steer"], scenario, changes, execute)
     with stoppable(execute.folder):
@@ -261,7 +261,7 @@ class EvaluatedRuns:
         from yawbench.foundation.safe_files import write_whole
         from yawbench.reports.evaluation_page import evaluation_page
         from yawbench.reports.page_parts import save_page
-        from yawbench.studies.result_tables import run_table, runs_table
+        from yawbench.studies.evaluation_tables import run_table, runs_table
 
         drawn = self._draw(each=each, together=together)
         data = {

@@ -10,7 +10,7 @@ PLUGINS = {
         "bands": "yawbench.measured_cars.validation:BandsSpec",
         "fit": "yawbench.measured_cars.fit:FitSpec",
     },
-    "judge of a study": {"validations": "yawbench.measured_cars.of_studies"},
+    "section of a study": {"validations": "yawbench.measured_cars.of_studies:VALIDATIONS"},
     "library": {
         "Fit": "yawbench.measured_cars.library_fit:Fit",
         "fit": "yawbench.measured_cars.library_fit:fit",

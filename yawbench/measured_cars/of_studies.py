@@ -1,23 +1,36 @@
-"""Validations in studies: runs compared with measured cars, as the key `validations` asks."""
+"""Validations in studies: runs compared with measured cars, as the section `validations` asks."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from pydantic import Field
+
 from yawbench.orchestrator.recordings.measurement import Measurement, load_measurement
 from yawbench.orchestrator.results.reader import Results
-from yawbench.studies.claim_schema import ValidationSpec
+from yawbench.orchestrator.scenario.schema_validation import StrictModel
+from yawbench.studies.claim_schema import RunName
+from yawbench.studies.sections import Section
 
 from .validation import Bands, Validation, compare_run, load_bands
 from .validation_page import validation_facts, validation_table
 
+
+class ValidationSpec(StrictModel):
+    """A run compared with measurements of the car (`docs/measured_cars.md`)."""
+
+    run: RunName = Field(description="Name of a run, of a steady-state test")
+    measured: str = Field(description="Measurement file, relative to this file", min_length=1)
+    bands: str = Field(
+        "steady_state", description="Tolerances: a name in scenarios/bands, or a file beside it"
+    )
+
+
 Recordings = list[tuple[ValidationSpec, Measurement, Bands]]
 
-table, facts = validation_table, validation_facts
 
-
-def load(specs: Sequence[ValidationSpec], folder: Path) -> Recordings:
+def _load(specs: Sequence[ValidationSpec], folder: Path) -> Recordings:
     """Return the validations of a study in a folder, with their measurements and bands.
 
     Raises:
@@ -33,10 +46,16 @@ def load(specs: Sequence[ValidationSpec], folder: Path) -> Recordings:
     ]
 
 
-def compare(results: Mapping[str, Results], recordings: Recordings) -> list[Validation]:
+def _compare(results: Mapping[str, Results], recordings: Recordings) -> list[Validation]:
     """Return the comparisons of the runs that have results."""
     return [
         compare_run(results[spec.run], measurement, bands)
         for spec, measurement, bands in recordings
         if spec.run in results
     ]
+
+
+VALIDATIONS = Section(
+    ValidationSpec, "Runs to be compared with measured cars", _load, _compare, validation_table,
+    validation_facts,
+)  # fmt: skip

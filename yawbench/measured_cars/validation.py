@@ -35,7 +35,7 @@ from yawbench.foundation.errors import Diagnostic, ResultsError, ScenarioError, 
 from yawbench.foundation.messages import counted, hint, resolved
 from yawbench.foundation.safe_files import reads
 from yawbench.metrics.measures import words
-from yawbench.metrics.verdict import Verdict, apart, compare, not_judged, worst
+from yawbench.metrics.verdict import Verdict, apart, compare, not_judged, worded, worst
 from yawbench.orchestrator.recordings.measurement import Measurement
 from yawbench.orchestrator.recordings.motion import ANGLES, LEAST_SPEED, standing
 from yawbench.orchestrator.recordings.segment import Segment
@@ -476,7 +476,7 @@ def _draw(validation: Validation) -> Figure:
         ]
         if any((test.distance > 1.0).any() for plot in validation.plots for test in plot.tests):
             handles.append(Line2D([], [], label="outside", color=CHANGED, **dot))
-        verdicts = ", ".join(f"{words(name)} {v.status.value}" for name, v in validation.verdicts.items())
+        verdicts = ", ".join(f"{words(name)} {worded(v.status)}" for name, v in validation.verdicts.items())
         tests = counted(len(validation.plots[0].tests), "test") if validation.plots else "no test"
         note = " · ".join(filter(None, [
             f"{validation.bands}: {validation.source}", tests, validation.origin,

@@ -11,7 +11,7 @@ from yawbench.figures.style import LabelledRun, shown
 from yawbench.foundation.messages import listed
 from yawbench.measured_cars.validation import Validation
 from yawbench.metrics.measures import words
-from yawbench.metrics.verdict import SYMBOLS, apart
+from yawbench.metrics.verdict import SYMBOLS, apart, worded
 from yawbench.orchestrator.results.measurement_results import MeasuredResults
 from yawbench.orchestrator.results.reader import Results
 from yawbench.reports.evaluation_page import drawn
@@ -25,7 +25,7 @@ def validation_table(validation: Validation) -> Table:
     title = f"{validation.title}, against {validation.measured}"
     table = Table(title, ["signal", "verdict", "largest distance"])
     for name, verdict in validation.verdicts.items():
-        table.rows.append([name, verdict.status.value, verdict.why])
+        table.rows.append([name, worded(verdict.status), verdict.why])
     table.notes = [f"{validation.bands}: {validation.source}"]
     return table
 
@@ -38,7 +38,7 @@ def conditions_table(validation: Validation) -> Table:
         ends = (verdict.value, verdict.bound)
         value, bound = (f"{x:g}" if verdict.shown_in == "1" else shown(x, verdict.shown_in) for x in ends)
         limit = f"{SYMBOLS[verdict.relation]} {bound}"
-        table.rows.append([name, verdict.status.value, value, limit])
+        table.rows.append([name, worded(verdict.status), value, limit])
     return table
 
 

@@ -1,15 +1,17 @@
 """Verdicts: numbers compared with bounds, and how far from the opposite verdict.
 
-A claim, a criterion of a standard test and a limit all come to a `Verdict`: the number x, its bound b, and
-whether x is on the side of b where it should be. The margin is how far x lies beyond b on that side, relative
-to |b|, or to |x| where b is 0; it is negative on the other side, and zero where the verdict flips.
+A claim, a criterion of a standard test, a validation and a limit all come to a `Verdict`: the number x, its
+bound b, and whether x is on the side of b where it should be. The margin is how far x lies beyond b on that
+side, relative to |b|, or to |x| where b is 0; it is negative on the other side, and zero where the verdict
+flips. The verdict on several conditions has theirs as its parts (`all_of`). People read it in the words of
+`worded`.
 """
 
 from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import Any, Literal
@@ -37,6 +39,30 @@ class Status(str, Enum):
     SENSITIVE = "depends on open values"  # it changes in at least a tenth of their region
     UNDECIDED = "undecided"  # chance may change it, or whether it is sensitive is not known
     NOT_JUDGED = "not judged"
+
+
+Judged = Literal["claims", "checks", "criteria"]
+"""What is judged: claims of a paper, our own checks, or criteria of tests, validations and limits."""
+_WORDS = {
+    ("claims", Status.PASSED): "holds",
+    ("claims", Status.FAILED): "does not reproduce",
+    ("checks", Status.PASSED): "holds",
+    ("checks", Status.FAILED): "does not hold",
+}
+"""Words other than the status's own."""
+
+
+class VerdictText(str):
+    """The words of a verdict, with the status that they tell: pages add its sign."""
+
+    status: Status
+
+
+def worded(status: Status, of: Judged = "criteria") -> VerdictText:
+    """Return a status in the words for what is judged."""
+    text = VerdictText(_WORDS.get((of, status), status.value))
+    text.status = status
+    return text
 
 
 WORST_FIRST = (Status.FAILED, Status.NOT_JUDGED, Status.SENSITIVE, Status.UNDECIDED, Status.PASSED)
@@ -83,6 +109,7 @@ class Verdict(WithUnit):
     half: float = 0.0  # half width of the confidence interval of value - bound, as means over repeats
     why: str = ""  # the reason in words
     percent: bool = field(default=False, kw_only=True, repr=False)  # whether tables show a ratio in per cent
+    parts: tuple[Verdict, ...] = field(default=(), kw_only=True, repr=False)  # one per condition and run
 
     @property
     def holds(self) -> bool | None:
@@ -98,12 +125,18 @@ class Verdict(WithUnit):
 
     @property
     def certain(self) -> bool:
-        """Whether the bound lies outside the confidence interval of the value."""
+        """Whether the verdict is beyond chance: no deciding bound lies within the interval of its value."""
+        if self.parts:
+            deciding = [part.certain for part in self.parts if part.holds is self.holds]
+            return self.holds is None or (all(deciding) if self.holds else any(deciding))
         beyond = self.beyond
         return beyond is None or not abs(beyond) < self.half
 
     def scaled(self, chosen: Verdict) -> Verdict:
-        """Return the verdict with its margin relative to |x| of `chosen` where the bound is 0."""
+        """Return the verdict with margins relative to |x| of `chosen` where the bound is 0."""
+        if self.parts:
+            pairs = zip(self.parts, chosen.parts, strict=True)
+            return all_of([part.scaled(at) for part, at in pairs])
         beyond = self.beyond
         if beyond is None or self.margin is None or self.bound:
             return self
@@ -117,7 +150,7 @@ class Verdict(WithUnit):
         return {"verdict": self.status, "why": self.why, **data, **own}
 
     def __str__(self) -> str:
-        return f"{self.status.value}. {self.why}"
+        return f"{worded(self.status)}. {self.why}"
 
 
 def compare(
@@ -165,6 +198,14 @@ def worst(verdicts: Iterable[Verdict]) -> Verdict | None:
         return WORST_FIRST.index(verdict.status), math.inf if verdict.margin is None else verdict.margin
 
     return min(verdicts, key=badness, default=None)
+
+
+def all_of(parts: Sequence[Verdict]) -> Verdict:
+    """Return the verdict on conditions that must all be true; not judged if a number is missing."""
+    missing = next((part for part in parts if part.status is Status.NOT_JUDGED), None)
+    margins = [part.margin for part in parts if part.margin is not None]
+    deciding = missing or worst(parts) or Verdict(Status.PASSED)
+    return replace(deciding, margin=None if missing else min(margins, default=None), parts=tuple(parts))
 
 
 def _beyond(value: float, bound: float, upwards: bool) -> float:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from yawbench.figures.style import CHANGED, QUIET, frame, line_style, new_figure
-from yawbench.metrics.verdict import NotJudged, Status
+from yawbench.metrics.verdict import NotJudged, Status, worded
 from yawbench.vocabulary.lane_change import Lane, lanes_of
 
 from .sine_with_dwell import AT, FAR, RATIOS, DwellCourse, conclusion, course_of, percent
@@ -68,7 +68,7 @@ def draw_dwell_run(trace: Trace, judged: Evaluation) -> Figure | None:
 
 
 def _verdicts(judged: Evaluation) -> str:
-    return ", ".join(f"{name} {verdict.status.value}" for name, verdict in judged.criteria.items())
+    return ", ".join(f"{name} {worded(verdict.status)}" for name, verdict in judged.criteria.items())
 
 
 def _label(axes: Axes, x: float, y: float, text: str, offset: tuple[float, float], **more: Any) -> None:
@@ -182,7 +182,7 @@ def draw_dwell_series(series: TestSeries, note: str) -> Figure:
             for k, name in enumerate(("left first", "right first"))
         ]
         verdicts = "; ".join(
-            f"{name} {criterion.status.value}: {criterion.why}" for name, criterion in series.criteria.items()
+            f"{name} {worded(verdict.status)}: {verdict.why}" for name, verdict in series.criteria.items()
         )
         angle = math.degrees(series.data["A"])
         title = f"Sine with dwell, A = {angle:.1f}°: the series has {conclusion(series.criteria)}"
@@ -231,7 +231,7 @@ def draw_lane_change_run(trace: Trace, judged: Evaluation) -> Figure:
         clean = judged.criteria[CLEAN]
         speed = "" if entry is None else f", {3.6 * entry:.1f} km/h at the first cones"
         note = " · ".join([*filter(None, [trace.title, trace.name]), *map(str, judged.diagnostics)])
-        title = f"Lane change{speed}: {clean.status.value}, {clean.why}"
+        title = f"Lane change{speed}: {worded(clean.status)}, {clean.why}"
         frame(figure, 1.45 * sum(heights), [], title, note)
     return figure
 

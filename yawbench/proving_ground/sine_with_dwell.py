@@ -39,7 +39,7 @@ import numpy as np
 from yawbench.figures.style import shown
 from yawbench.foundation.messages import listed
 from yawbench.metrics.measures import running_integral
-from yawbench.metrics.verdict import NotJudged, Status, Verdict, apart, compare, not_judged, worst
+from yawbench.metrics.verdict import NotJudged, Status, Verdict, apart, compare, not_judged, worded, worst
 from yawbench.orchestrator.recordings.motion import largest
 
 from .standard_tests import Evaluation, Limit, Mark, SeriesDriver, SeriesRun, TestSeries, evaluation
@@ -322,7 +322,7 @@ def _add_beyond(judged: Evaluation, course: DwellCourse, trace: Trace) -> None:
         peak = largest(trace.while_moving("sideslip")[after])
         judged.add("sideslip", "peak sideslip", peak, "rad", "from BOS to the end of the record")
         if peak is not None and peak > SPUN:
-            stable = judged.criteria["stability"].status.value
+            stable = worded(judged.criteria["stability"].status)
             reached = apart(math.degrees(peak), math.degrees(SPUN), decimals=0)
             why = f"sideslip reaches {reached} degrees (stability: {stable})"
             judged.report("sideslip-large", why)

@@ -43,7 +43,7 @@ from yawbench.metrics.verdict import NotJudged
 from yawbench.orchestrator.plan import Override, Plan
 from yawbench.orchestrator.scenario import yaml_lines
 from yawbench.orchestrator.scenario.schema import Scalar
-from yawbench.orchestrator.scenario.schema_validation import StrictModel, Time, validated
+from yawbench.orchestrator.scenario.schema_validation import StrictModel, Time, made, validated
 from yawbench.orchestrator.signal_names import Target
 from yawbench.proving_ground.sine_with_dwell import AMPLITUDE, SIDES, amplitudes
 from yawbench.proving_ground.standard_tests import Evaluation
@@ -56,7 +56,7 @@ from yawbench.studies.axes import (
     axis_of_levels,
     changes_of_file,
 )
-from yawbench.studies.claim_schema import text_of
+from yawbench.studies.claim_schema import MetricSpec, text_of
 from yawbench.studies.executor import Executor
 from yawbench.studies.experiment import LoadedExperiment, LoadedFile, NamedRun, experiment_of
 from yawbench.studies.experiment_result import ExperimentResult
@@ -365,7 +365,7 @@ def dwell_experiment(
     axes["amplitude"] = axis_of_levels(AMPLITUDE, [point[-1] for _, point in design])
     return experiment_of(
         ranking.path, runs, title=ranking.spec.title, axes=axes, design=design, origin="ranking",
-        metrics={key: {"metric": name} for key, name in METRICS.items()},
+        metrics={key: made(MetricSpec, metric=name) for key, name in METRICS.items()},
     )  # fmt: skip
 
 

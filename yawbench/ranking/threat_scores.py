@@ -26,7 +26,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from yawbench.studies import claim_schema
+from yawbench.studies import derived
 from yawbench.studies.confidence import (
     DRAWS,
     TAIL,
@@ -78,7 +78,7 @@ def mean_ranks(positions: np.ndarray) -> np.ndarray:
     """Return the mean rank of every entry, 1 the best; equal levels share the mean of their ranks."""
     ranks = np.full(positions.shape, np.nan)
     for threat, car in zip(*np.nonzero(~np.isnan(positions[0])), strict=True):
-        ranks[:, threat, car] = claim_schema.ranks(-positions[:, threat, car])
+        ranks[:, threat, car] = derived.ranks(-positions[:, threat, car])
     return mean_positions(ranks)
 
 
@@ -228,7 +228,7 @@ def moves_between(before: Mapping[str, float], after: Mapping[str, float], refer
     }
     of_laws = [places[entry] for entry in both if entry != reference]
     farthest = max(both, key=lambda e: abs(places[e][1] - places[e][0]) if e != reference else -1)
-    correlation = claim_schema.rank_correlation(*zip(*of_laws, strict=True)) if len(of_laws) > 2 else None
+    correlation = derived.rank_correlation(*zip(*of_laws, strict=True)) if len(of_laws) > 2 else None
     return Moves(
         math.nan if correlation is None else correlation,
         sum(old != new for old, new in of_laws),

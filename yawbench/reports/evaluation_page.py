@@ -17,16 +17,13 @@ import numpy as np
 from yawbench.figures.style import LabelledRun, digits_apart, shown
 from yawbench.foundation.messages import counted
 from yawbench.metrics.measures import words
-from yawbench.metrics.verdict import SYMBOLS, Status, Verdict, worst
+from yawbench.metrics.verdict import SYMBOLS, Status, Verdict, worded, worst
 from yawbench.orchestrator.results.reader import Results, load_results
 from yawbench.orchestrator.results.run_record import RunRecord
 from yawbench.proving_ground.standard_tests import Evaluation, Limit, StandardTest, TestSeries
 from yawbench.proving_ground.trace import Trace
-from yawbench.studies.result_tables import (
-    margin_words,
-    run_table,
-    runs_table,
-)
+from yawbench.studies.evaluation_tables import run_table, runs_table
+from yawbench.studies.result_tables import margin_words
 from yawbench.studies.tables import Table
 from yawbench.vocabulary.signals import SIGNALS
 
@@ -52,7 +49,7 @@ def criteria_table(judged: Sequence[Evaluation], series: TestSeries | None) -> t
         labels.append(next(label for label, verdict in own.items() if verdict is deciding))
         verdict = series.criteria.get(name, deciding) if series else deciding
         number = verdict if verdict.beyond is not None else replace(deciding, status=verdict.status)
-        row = [name, verdict.status.value, *_numbers(number), _distance(number)]
+        row = [name, worded(verdict.status), *_numbers(number), _distance(number)]
         row += labels[-1:] * (len(judged) > 1) + [verdict.why]
         table.rows.append([cell or None for cell in row])
     return table, labels
@@ -121,7 +118,7 @@ def _sentence(criteria: Table, judged: Sequence[Evaluation]) -> str:
         return (
             "The test has no criteria." if not missing else f"{counted(missing, 'run')} could not be judged."
         )
-    passed = sum(row[1] == Status.PASSED.value for row in criteria.rows)
+    passed = sum(row[1] == worded(Status.PASSED) for row in criteria.rows)
     return f"{passed} of {counted(len(criteria.rows), 'criterion', 'criteria')} passed."
 
 

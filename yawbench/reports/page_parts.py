@@ -28,7 +28,7 @@ from markupsafe import Markup
 from yawbench.fmus.fmu import Value, Variable
 from yawbench.foundation.messages import fold, printable
 from yawbench.foundation.safe_files import write_whole
-from yawbench.metrics.verdict import Status
+from yawbench.metrics.verdict import Status, VerdictText
 from yawbench.orchestrator.plan import (
     CHOSEN,
     ERRATUM,
@@ -44,7 +44,6 @@ from yawbench.orchestrator.plan import (
 from yawbench.orchestrator.results.reader import Results
 from yawbench.orchestrator.results.record_of_plan import versions
 from yawbench.orchestrator.results.run_record import NOT_RECORDED, RunRecord
-from yawbench.studies.result_tables import FAILS, HOLDS, NOT_JUDGED, SENSITIVE, UNDECIDED
 from yawbench.studies.tables import Table
 from yawbench.vocabulary.wheels import WHEEL_NAMES, WHEELS
 
@@ -137,15 +136,13 @@ def anchor(text: str) -> str:
 
 
 SIGNS = {
-    HOLDS: ("good", "✓"),
-    Status.PASSED.value: ("good", "✓"),
-    Status.FAILED.value: ("bad", "✗"),
-    SENSITIVE: ("unsure", "±"),
-    UNDECIDED: ("unsure", "?"),
-    NOT_JUDGED: ("open", "–"),
-    **{word: ("bad", "✗") for word in FAILS.values()},
+    Status.PASSED: ("good", "✓"),
+    Status.FAILED: ("bad", "✗"),
+    Status.SENSITIVE: ("unsure", "±"),
+    Status.UNDECIDED: ("unsure", "?"),
+    Status.NOT_JUDGED: ("open", "–"),
 }
-"""Verdict -> CSS class and symbol, which differ even without colours."""
+"""Status -> CSS class and symbol, which differ even without colours."""
 
 
 def render(template: str, facts: Mapping[str, Any] = MappingProxyType({}), **more: Any) -> str:
@@ -247,12 +244,12 @@ def with_minus(text: str) -> str:
     return re.sub(r"(?<![^\s(])-(?=\.?\d)", "−", text)
 
 
-def verdict_sign(word: str) -> Markup:
-    """Return a verdict as a symbol with its word; other text unchanged."""
-    if word not in SIGNS:
-        return Markup.escape(word)
-    kind, sign = SIGNS[word]
-    return Markup('<span class="verdict {}"><b aria-hidden="true">{}</b> {}</span>').format(kind, sign, word)
+def verdict_sign(text: str) -> Markup:
+    """Return the text of a verdict with its symbol; other text unchanged."""
+    if not isinstance(text, VerdictText):
+        return Markup.escape(text)
+    kind, sign = SIGNS[text.status]
+    return Markup('<span class="verdict {}"><b aria-hidden="true">{}</b> {}</span>').format(kind, sign, text)
 
 
 @dataclass

@@ -28,23 +28,19 @@ from yawbench.orchestrator.scenario.overrides import changed
 from yawbench.planner import Planner
 from yawbench.studies.claims import ClaimResult
 from yawbench.studies.confidence import CONFIDENCE
-from yawbench.studies.experiment import FIGURES, LoadedExperiment, validating
+from yawbench.studies.experiment import FIGURES, LoadedExperiment
 from yawbench.studies.experiment_result import Each, ExperimentResult
 from yawbench.studies.jobs import Job
 from yawbench.studies.open_value_regions import runs_of as runs_of_claim
-from yawbench.studies.result_files import runs_of, title_of
+from yawbench.studies.result_figures import runs_of, title_of
 from yawbench.studies.result_tables import (
-    FAILS,
-    HOLDS,
-    NOT_JUDGED,
-    SENSITIVE,
-    UNDECIDED,
     counts_of,
     derived_tables,
     heading,
     limit_tables,
     line_table,
     margin_words,
+    measured_words,
     reach,
     region_table,
     region_words,
@@ -52,6 +48,7 @@ from yawbench.studies.result_tables import (
     verdict,
 )
 from yawbench.studies.schema import FigureSpec
+from yawbench.studies.sections import sections
 from yawbench.studies.tables import Cell, Table
 
 from .diagram import diagram, systems_of
@@ -145,8 +142,9 @@ def chapter(
         "comparison": None,
         "results": [],
         "validations": [
-            validating().facts(validation, f"validation-{number}")
-            for number, validation in enumerate(findings.validations, start=1)
+            sections()[section].facts(finding, f"{section}-{number}")
+            for section, found in findings.sections.items()
+            for number, finding in enumerate(found, start=1)
         ],
         "fmus": fmus_of(kinds),
         "programs": programs_of(kinds),
@@ -226,10 +224,11 @@ def answer(findings: ExperimentResult) -> str:
 def in_sentence(counts: Mapping[str, int]) -> str:
     """Return how many verdicts are of each kind: `1 holds, 2 do not reproduce and 3 are undecided`."""
     parts = []
-    for word, count in counts.items():
-        if word in (UNDECIDED, NOT_JUDGED):
-            word = f"{'is' if count == 1 else 'are'} {word}"
-        parts.append(f"{count} {word if count == 1 else SEVERAL.get(word, word)}")
+    for words, count in counts.items():
+        verb, space, more = words.partition(" ")
+        several = {"holds": "hold", "does": "do", "depends": "depend"}.get(verb)
+        said = f"{several if count > 1 else verb}{space}{more}" if several else words
+        parts.append(f"{count} {said}" if several else f"{count} {'is' if count == 1 else 'are'} {said}")
     return listed(parts, last="and")
 
 
@@ -238,7 +237,7 @@ def judged(result: ClaimResult) -> dict[str, Any]:
     return {
         "says": result.claim.says,
         "source": result.claim.source,
-        "measured": result.measured,
+        "measured": measured_words(result),
         "conditions": [str(condition) for condition in result.claim.holds_if],
         "verdict": verdict(result),
         "margin": margin_words(result.verdict),
@@ -261,12 +260,6 @@ def systems(plans: Sequence[tuple[Job, tuple[LoadedScenario, Plan]]], title: str
 
 LIVELY = tuple(map(metric, ("peak(sideslip)", "peak(yaw_rate)")))
 """Metrics of how lively a run is; the first that all runs have is used."""
-SEVERAL = {
-    HOLDS: "hold",
-    SENSITIVE: "depend on open values",
-    **{word: word.replace("does", "do", 1) for word in FAILS.values()},
-}
-"""Verdict -> its plural."""
 LONG = 16
 """Rows of tables; further tables are folded. Chosen: with the claims, a page stays below 2,000 elements."""
 VIEW = "view"

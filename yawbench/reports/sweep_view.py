@@ -27,8 +27,9 @@ from yawbench.orchestrator.results.run_folder import RUN_FILE
 from yawbench.studies.axes import RUN, Level, changes_at
 from yawbench.studies.claim_schema import MetricReference, si_number
 from yawbench.studies.experiment import Case
-from yawbench.studies.experiment_result import Each, ExperimentResult, Limit, limits_of
+from yawbench.studies.experiment_result import Each, ExperimentResult
 from yawbench.studies.jobs import NOT_MADE, Job
+from yawbench.studies.limits import Limit, limits_of
 
 from .page_parts import option_of, render
 from .viewer import DATA, METRICS, PANELS, Settings, View, carried, embedded, tidy_sides, write_side

@@ -38,13 +38,13 @@ AxisKind = Literal["setting", "fmu", "file", "variant"]
 
 
 def _targets(value: object) -> list[Target]:
-    texts = [value] if isinstance(value, str) else value
-    if not isinstance(texts, list) or not texts or not all(isinstance(text, str) and text for text in texts):
+    given: list[Any] = value if isinstance(value, list) else [value]
+    if not given or not all(isinstance(one, Target) or (isinstance(one, str) and one) for one in given):
         raise ValueError(
             "must be instance.parameter, vehicle.parameter, inputs.pattern, an instance, vehicle or tyres "
             f"(got {short(value)})"
         )
-    return [Target.parse(text) for text in texts]
+    return [one if isinstance(one, Target) else Target.parse(one) for one in given]
 
 
 def _target(value: object) -> Target:

@@ -24,9 +24,10 @@ from yawbench.orchestrator.signal_names import Target
 
 from .axes import RUN, Level, names_of
 from .claim_schema import si_number, text_of
-from .claims import cells
+from .derived import cells
 from .experiment import Case
-from .experiment_result import ExperimentResult, limits_of
+from .experiment_result import ExperimentResult
+from .limits import limits_of
 from .schema import FigureSpec
 
 if TYPE_CHECKING:

@@ -9,15 +9,11 @@ run is missing or a divisor is zero.
 
 from __future__ import annotations
 
-import ast
-import math
-import operator
 import re
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Annotated, Any, Literal, get_args
 
-import numpy as np
 from pydantic import (
     AfterValidator,
     ConfigDict,
@@ -37,6 +33,8 @@ from yawbench.metrics.measures import MEASURES
 from yawbench.metrics.verdict import SYMBOLS, Relation
 from yawbench.orchestrator.scenario.quantities import convert
 from yawbench.orchestrator.scenario.schema_validation import StrictModel, exactly_one
+
+from .expression import ExpressionField
 
 
 def text_of(value: object) -> str:
@@ -85,90 +83,6 @@ QuantityText = Annotated[float | int | str, PlainValidator(_quantity), WithJsonS
 """A number in SI units, or text with a number and its unit."""
 
 
-LONGEST = 400
-"""Characters of an expression. Chosen: eight times our longest; bounds the depth of recursion."""
-
-_OPERATIONS: dict[type[ast.operator], Callable[[float, float], float]] = {
-    ast.Add: operator.add,
-    ast.Sub: operator.sub,
-    ast.Mult: operator.mul,
-    ast.Div: operator.truediv,
-}
-
-
-def parse(text: str) -> ast.expr:
-    """Parse an arithmetic expression.
-
-    Raises:
-        ValueError: the text is not an expression, or contains more than arithmetic.
-    """
-    if len(text) > LONGEST:
-        raise ValueError(f"{short(text)}: an expression has at most {LONGEST} characters")
-    try:
-        tree = ast.parse(text.strip(), mode="eval").body
-    except (SyntaxError, ValueError, RecursionError, MemoryError):  # syntax, null bytes, nested brackets
-        raise ValueError(f"{short(text)} is not an expression such as (a - b) / a") from None
-    for node in _nodes(tree):
-        plain = isinstance(node, ast.Constant) and type(node.value) in (int, float)
-        if not (plain or isinstance(node, (ast.Name, ast.BinOp, ast.UnaryOp))):
-            raise ValueError(f"{text!r}: only numbers, names, + - * / and parentheses are allowed")
-        if isinstance(node, ast.BinOp) and type(node.op) not in _OPERATIONS:
-            raise ValueError(f"{text!r}: only + - * / are allowed")
-        if isinstance(node, ast.UnaryOp) and not isinstance(node.op, ast.USub):
-            raise ValueError(f"{text!r}: only + - * / are allowed")
-    return tree
-
-
-def _nodes(tree: ast.expr) -> Iterator[ast.expr]:
-    return (node for node in ast.walk(tree) if isinstance(node, ast.expr))
-
-
-def names_in(text: str) -> list[str]:
-    """Return the names in an expression, each once."""
-    return list(dict.fromkeys(node.id for node in _nodes(parse(text)) if isinstance(node, ast.Name)))
-
-
-def calculate(text: str, values: Mapping[str, float]) -> float | None:
-    """Return the value of an expression; None if it divides by zero or is not finite.
-
-    Args:
-        text: the expression.
-        values: name -> value, of every name in it.
-    """
-
-    def value_of(node: ast.expr) -> float:
-        if isinstance(node, ast.BinOp):
-            return _OPERATIONS[type(node.op)](value_of(node.left), value_of(node.right))
-        if isinstance(node, ast.UnaryOp):
-            return -value_of(node.operand)
-        if isinstance(node, ast.Name):
-            return values[node.id]
-        assert isinstance(node, ast.Constant)
-        return float(node.value)  # type: ignore[arg-type]
-
-    try:
-        number = value_of(parse(text))
-    except (ZeroDivisionError, OverflowError):
-        return None
-    return number if math.isfinite(number) else None
-
-
-def ranks(x: Sequence[float] | np.ndarray) -> np.ndarray:
-    """Return the ranks of values, from 1; ties get the mean of their ranks."""
-    array = np.asarray(x, dtype=float)
-    below = (array[:, None] > array[None, :]).sum(axis=1)
-    equal = (array[:, None] == array[None, :]).sum(axis=1)
-    average: np.ndarray = below + (equal + 1) / 2
-    return average
-
-
-def rank_correlation(x: Sequence[float], y: Sequence[float]) -> float | None:
-    """Return Spearman's rank correlation of two sequences of equal length; None if one is constant."""
-    a, b = (ranks(values) - (len(values) + 1) / 2 for values in (x, y))
-    scale = math.sqrt(float(a @ a) * float(b @ b)) if len(x) > 1 else 0.0
-    return float(a @ b) / scale if scale > 0 else None
-
-
 CELLS = 10_000
 """Largest number of cells in a grid. Chosen: a hundred times our largest."""
 
@@ -213,7 +127,21 @@ WindowField = Annotated[tuple[float, float], PlainValidator(_window), WithJsonSc
 MetricName = Annotated[
     str, AfterValidator(_metric_name), WithJsonSchema({"type": "string", "pattern": _METRIC_PATTERN})
 ]
-Patterns = Annotated[list[str], Field(min_length=1)]
+
+
+@dataclass(frozen=True)
+class NameOf:
+    """Mark of a field that names something in its experiment: by its text, texts of a list or keys."""
+
+    kind: Literal[
+        "run", "runs", "metric", "axis", "axis or run", "derived number", "grid", "limit", "open value"
+    ]
+
+
+RunName = Annotated[str, NameOf("run")]
+MetricKey = Annotated[str, NameOf("metric")]
+DerivedKey = Annotated[str, NameOf("derived number")]
+Patterns = Annotated[list[str], Field(min_length=1), NameOf("runs")]
 """Names of runs; `*` and `?` are wildcards."""
 
 
@@ -257,7 +185,7 @@ class GridSpec(StrictModel):
     """A metric of many runs in rows and columns, with the paper's numbers to compare."""
 
     title: str = Field(min_length=1)
-    metric: str = ""
+    metric: MetricKey = ""
     run: str = Field("", description="Names of the runs, with {name} for row and column")
     derived: str = Field(
         "", description="Instead of metric and run: keys of `derived`, with {name} for row and column"
@@ -295,13 +223,8 @@ class GridSpec(StrictModel):
 class MetricSource(StrictModel):
     """A metric of a run."""
 
-    run: str
-    metric: str
-
-
-def _expression(text: str) -> str:
-    parse(text)
-    return text
+    run: RunName
+    metric: MetricKey
 
 
 class DerivedSpec(StrictModel):
@@ -313,9 +236,11 @@ class DerivedSpec(StrictModel):
     for_each: dict[str, Alternatives] = Field(
         {}, alias="for", description="Key -> values; one number per combination, named in its key by {key}"
     )
-    expression: Annotated[str, AfterValidator(_expression)] | None = None
+    expression: ExpressionField | None = None
     of: dict[str, MetricSource] = Field({}, description="Name in the expression -> metric of a run")
-    rank_correlation: str | None = Field(None, description="Grid whose order is compared with the paper's")
+    rank_correlation: Annotated[str | None, NameOf("grid")] = Field(
+        None, description="Grid whose order is compared with the paper's"
+    )
     only: dict[str, Alternatives] = Field(
         {}, description="Rows or columns of the grid -> those of their values that count"
     )
@@ -328,7 +253,7 @@ class DerivedSpec(StrictModel):
             raise ValueError("needs exactly one of expression and rank_correlation")
         if self.only and self.rank_correlation is None:
             raise ValueError("only: belongs to a rank_correlation")
-        for name in names_in(self.expression) if self.expression else ():
+        for name in self.expression.names if self.expression else ():
             if name not in self.of:
                 raise ValueError(f"expression: {name} is undefined; 'of' has {listed(self.of)}")
         if self.published is not None:
@@ -342,8 +267,8 @@ class DerivedSpec(StrictModel):
 class MetricReference(StrictModel):
     """A metric of another run as a bound."""
 
-    run: str
-    metric: str
+    run: RunName
+    metric: MetricKey
     times: float = 1.0
 
 
@@ -366,9 +291,11 @@ class Condition(StrictModel):
 
     model_config = ConfigDict(json_schema_extra=exactly_one(*SYMBOLS))
 
-    run: str = Field("", description="Name of a run; with `*` every run that matches; default: every run")
-    metric: str = ""
-    derived: str = Field("", description="Key of `derived`, in place of run and metric")
+    run: Annotated[str, NameOf("runs")] = Field(
+        "", description="Name of a run; with `*` every run that matches; default: every run"
+    )
+    metric: MetricKey = ""
+    derived: DerivedKey = Field("", description="Key of `derived`, in place of run and metric")
     above: Bound | None = None
     at_least: Bound | None = None
     below: Bound | None = None
@@ -417,7 +344,7 @@ class Claim(Assertion):
     short: str = Field("", description="The same for the table of runs, e.g. '> 100 %'")
     source: str = Field("", description="Where it is in the paper: section, figure, table")
     note: str = Field("", description="What a reader should know about the verdict")
-    open_values: list[str] | None = Field(
+    open_values: Annotated[list[str] | None, NameOf("open value")] = Field(
         None, description="Open values of the region that it depends on; default: all that affect its runs"
     )
     _number: int | None = PrivateAttr(None)
@@ -427,17 +354,7 @@ class Claim(Assertion):
         return otherwise if self._number is None else self._number
 
 
-class ValidationSpec(StrictModel):
-    """A run compared with measurements of the car."""
-
-    run: str = Field(description="Name of a run, of a steady-state test")
-    measured: str = Field(description="Measurement file, relative to this file", min_length=1)
-    bands: str = Field(
-        "steady_state", description="Tolerances: a name in scenarios/bands, or a file beside it"
-    )
-
-
 class LimitSpec(Assertion):
     """The largest value of an axis up to which all conditions hold, for each setting of the others."""
 
-    of: str = Field(description="The axis; its values must be numbers")
+    of: Annotated[str, NameOf("axis")] = Field(description="The axis; its values must be numbers")

@@ -12,12 +12,12 @@ from pathlib import Path
 from typing import Any
 
 from yawbench.fmus.fmu import Fmu
-from yawbench.foundation import plugins
 from yawbench.foundation.errors import Diagnostic, Location, ScenarioError
 from yawbench.metrics.expressions import STANDARD, TimeWindow, metric, results_to_be, unit_in
 from yawbench.orchestrator.plan import Override, OverrideOrigin, Plan
 from yawbench.orchestrator.results.reader import Results
 from yawbench.orchestrator.scenario import quantities
+from yawbench.orchestrator.scenario.schema_validation import made
 from yawbench.orchestrator.scenario.yaml_lines import dotted
 from yawbench.orchestrator.signal_names import Target
 from yawbench.orchestrator.wiring.context import FACTS, reached
@@ -27,7 +27,9 @@ from .axes import AxisSpec, DesignAxisSpec, DesignPoint, Level, changes_at, grid
 from .claim_schema import MetricReference, MetricSpec, si_number
 from .jobs import Job, MetricRequests, TestRequest, key_of, plans_of
 from .on_demand import OnDemand
-from .schema import ExperimentSpec
+from .references import problems_of, refuse
+from .schema import ExperimentSpec, RunSpec
+from .sections import sections
 
 FIGURES = "figures"
 """Folder of the figures, next to the folders of named runs."""
@@ -193,10 +195,12 @@ class LoadedExperiment(LoadedFile):
         return next(((name, target) for name, axis in axes if target in axis.targets), None)
 
     @cached_property
-    def recordings(self) -> Any:
-        """The validations with their measurements and bands, as `validating` loads them."""
-        validations = self.spec.validations
-        return validating().load(validations, self.path.parent) if validations else []
+    def loaded_sections(self) -> dict[str, Any]:
+        """Key of a section that a part adds -> what it has loaded for the entries of the file."""
+        entries = {name: getattr(self.spec, name, None) for name in sections()}
+        return {
+            name: sections()[name].load(given, self.path.parent) for name, given in entries.items() if given
+        }
 
     def _at(self, point: DesignPoint, run: NamedRun | None = None) -> list[Override]:
         """Return the overrides at a point; with `run`, only those of axes that apply to it."""
@@ -226,14 +230,23 @@ def experiment_of(
 
     Args:
         path: the file that it is made of; its folder and name identify it.
-        runs: the named runs.
+        runs: the named runs, or one without a name.
         changes: overrides of all runs.
         axes, design, origin: see `LoadedExperiment`.
-        keys: of the schema, such as its title, metrics and figures.
+        keys: of the schema: its title, metrics, figures, ... as specifications.
+
+    Raises:
+        ScenarioError: it is invalid; lists all errors.
     """
     named = {run.name: run for run in runs}
-    listed = [{"name": run.name, "scenario": run.scenario.name} for run in named.values()]
-    spec = ExperimentSpec.model_validate({"runs": listed, **keys}).model_copy(update={"axes": axes or {}})
+    if [*named] == [""]:
+        keys["scenario"] = named[""].scenario.name
+    else:
+        keys["runs"] = [made(RunSpec, name=name, scenario=run.scenario.name) for name, run in named.items()]
+    spec = made(ExperimentSpec, **keys, axes={} if design else axes or {})
+    if design:  # its points are not those of all axes
+        spec = spec.model_copy(update={"axes": axes or {}})
+    refuse(problems_of(spec, named))
     return LoadedExperiment(path, spec, named, (), tuple(changes), tuple(design), origin)
 
 
@@ -407,12 +420,3 @@ def _unit(axis: AxisSpec, plan: Plan) -> str | None:
     if target.kind == "fact":
         return FACTS[target.variable].unit
     return next((variable.unit for _, variable in reached(plan, target)), None)
-
-
-def validating() -> Any:
-    """Return what compares runs with measured cars: a module that loads, compares, tabulates and shows.
-
-    Raises:
-        ScenarioError: it is not installed.
-    """
-    return plugins.require("judge of a study", "validations")

@@ -1,4 +1,4 @@
-"""Result of an experiment: metrics of all cases, derived numbers, judged claims and checks, limits."""
+"""Result of an experiment: metrics of all cases, derived numbers, judged claims and checks."""
 
 from __future__ import annotations
 
@@ -8,27 +8,27 @@ from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
-from yawbench.figures.style import digits_of
 from yawbench.foundation.errors import Diagnostic, ResultsError
 from yawbench.foundation.messages import counted
 from yawbench.metrics.expressions import MetricValue
-from yawbench.metrics.verdict import PERCENT, Status, Verdict, not_judged, worst
+from yawbench.metrics.verdict import PERCENT, Judged
 from yawbench.orchestrator.plan import Plan
 from yawbench.orchestrator.results.reader import Results
 from yawbench.orchestrator.results.run_folder import RUN_FILE
 
-from .axes import RUN, DesignPoint, Level
-from .claim_schema import Claim, LimitSpec, calculate
-from .claims import ClaimResult, Judgement, MetricTable, Region, correlation, judge
+from .axes import DesignPoint
+from .claim_schema import Claim
+from .claims import ClaimResult, comparisons
 from .confidence import interval, share_bounds
-from .experiment import Case, LoadedExperiment, NamedRun, PlannedExperiment, metrics_of, validating
+from .derived import MetricTable, derive
+from .experiment import Case, LoadedExperiment, NamedRun, PlannedExperiment, metrics_of
 from .jobs import NOT_MADE, MeasuredRun, Outcome, measured, read_back
+from .region_verdicts import Region
 from .schema import ExperimentSpec
-from .tables import Cell, Table
+from .sections import sections
 
-K = TypeVar("K")
 Each = Callable[..., Iterable[Any]]
 """`map`, or a parallel equivalent such as `Pool.map`."""
 
@@ -237,35 +237,29 @@ class ExperimentResult:
         return self._judged("checks", self.spec.checks)
 
     @cached_property
-    def validations(self) -> list[Any]:
-        """The comparisons with measured cars, of the runs that have results."""
-        recordings = self.experiment.recordings
-        return validating().compare(self.results, recordings) if recordings else []
+    def sections(self) -> dict[str, list[Any]]:
+        """Key of a section that a part adds -> its findings on the runs that have results."""
+        loaded = self.experiment.loaded_sections
+        return {
+            name: section.compare(self.results, loaded[name]) if name in loaded else []
+            for name, section in sections().items()
+        }
 
     @property
     def judgements(self) -> list[ClaimResult]:
         """Claims and checks."""
         return [*self.claims, *self.checks]
 
-    def _judged(self, group: str, claims: Sequence[Claim]) -> list[ClaimResult]:
+    def _judged(self, group: Judged, claims: Sequence[Claim]) -> list[ClaimResult]:
+        """Judge claims; with axes they must hold at every setting."""
+        labels = {run.name: run.row for run in self.experiment.runs.values()}
+        settings = [(values, labels, self.derived_at[at]) for at, values in self.at.items()]
         return [
-            ClaimResult(
-                **vars(self.judge(claim)), claim=claim, region=self.regions.get((group, i)), group=group
+            ClaimResult.of(
+                claim, group, [comparisons(claim, *at) for at in settings], self.regions.get((group, i))
             )
             for i, claim in enumerate(claims)
         ]
-
-    def judge(self, claim: Claim) -> Judgement:
-        """Judge a claim; with axes it must hold at every setting."""
-        words = {run.name: run.row for run in self.experiment.runs.values()}
-        every = [judge(claim, values, words, self.derived_at[at]) for at, values in self.at.items()]
-        if len(every) == 1:
-            return every[0]
-        verdicts = [judgement.verdict for judgement in every]
-        holding = sum(verdict.holds is True for verdict in verdicts)
-        verdict = worst(verdicts) or Verdict(Status.PASSED)
-        text = f"holds at {holding} of {counted(len(every), 'point')}"
-        return Judgement(replace(verdict, margin=None), measured=(text,))
 
     def light(self) -> ExperimentResult:
         """Return a reduced copy with what figures over axes need, cheap to send to other processes."""
@@ -323,111 +317,3 @@ def judge_results(
             results[name] = read
             records.append(measured(read, metrics_of(experiment)))
     return ExperimentResult(experiment, records, results, planned)
-
-
-def derive(spec: ExperimentSpec, values: MetricTable) -> dict[str, MetricValue]:
-    """Compute the derived numbers, without those whose runs are missing."""
-    derived: dict[str, MetricValue] = {}
-    for key, entry in spec.derived.items():
-        number = None
-        if entry.rank_correlation is not None:
-            number = correlation(spec.grids[entry.rank_correlation], values, entry.only)
-        elif entry.expression is not None:
-            known = {word: values.get((source.run, source.metric)) for word, source in entry.of.items()}
-            numbers = {word: value.number for word, value in known.items() if value is not None}
-            number = calculate(entry.expression, numbers) if len(numbers) == len(known) else None
-        if number is not None:
-            derived[key] = MetricValue(number, entry.unit)
-    return derived
-
-
-@dataclass(frozen=True)
-class Limit:
-    """Limit of an axis for a run and a setting of the other axes, in the unit of the file."""
-
-    others: dict[str, Level]  # axis -> level; "run" -> the run, if named
-    largest: float | None  # up to which all values hold; None: not even the first
-    beyond: float | None  # the next value, which fails; None: all hold
-    verdict: Verdict  # at that value, else at the largest; not judged: why the run has no metric
-    cases: tuple[Case, ...] = ()  # the last that holds and the first that fails; of repeats the first
-
-    @property
-    def missing(self) -> bool:
-        """Whether the run at the next value has not been made."""
-        return self.verdict.why == NOT_MADE.reason
-
-
-def limits_of(findings: ExperimentResult, spec: LimitSpec) -> list[Limit]:
-    """Return the limit for every run and setting of the other axes, in the order of the design."""
-    experiment = findings.experiment
-    names = [name for name, axis in findings.spec.axes.items() if not axis.repeats]
-    at = names.index(spec.of)
-    lines: dict[tuple[str, tuple[Level, ...]], list[Case]] = {}
-    for case in experiment.first_cases:
-        setting = experiment.setting(case.point)
-        lines.setdefault((case.run.name, setting[:at] + setting[at + 1 :]), []).append(case)
-    limits = []
-    for (name, setting), cases in lines.items():
-        others = {RUN: Level(name, cases[0].run.label)} if name else {}
-        others |= zip((axis for axis in names if axis != spec.of), setting, strict=True)
-        limits.append(_limit(findings, spec, others, cases, at))
-    return limits
-
-
-def _limit(
-    findings: ExperimentResult, spec: LimitSpec, others: dict[str, Level], cases: list[Case], at: int
-) -> Limit:
-    run, largest, last, verdict = cases[0].run, None, None, Verdict(Status.PASSED)
-    by_setting = {findings.experiment.setting(case.point): case for case in reversed(cases)}
-    for setting in sorted(by_setting, key=lambda setting: float(setting[at].value)):
-        here, case = float(setting[at].value), by_setting[setting]
-        verdict = judge(spec, findings.at[setting], {run.name: run.row}).verdict
-        if not verdict.holds:
-            records = (findings.record(case) for case in findings.cases_of(run, setting))
-            if lost := next((record for record in records if not record.ok), None):
-                verdict = not_judged("the run failed" if lost.made else lost.status)
-            return Limit(others, largest, here, verdict, (last, case) if last else (case,))
-        largest, last = here, case
-    return Limit(others, largest, None, verdict, (last,) if last else ())
-
-
-LOST = ("run-process-died", "internal-error")
-"""Codes of failures that leave no results."""
-
-
-def kept_cases(findings: ExperimentResult) -> frozenset[int]:
-    """Return the numbers of the cases along axes whose results are to be kept; see `keep` in the schema."""
-    spec, cases = findings.spec, findings.experiment.cases
-    if spec.keep == "none" or not spec.axes:
-        return frozenset()
-    if spec.keep == "all":
-        return frozenset(case.number for case in cases)
-    limits = [limit for limit_spec in spec.limits.values() for limit in limits_of(findings, limit_spec)]
-    beside = {case.number for limit in limits for case in limit.cases if findings.record(case).made}
-    failed = {
-        case.number
-        for case in cases
-        if (record := findings.record(case)).failed
-        and not {diagnostic.code for diagnostic in record.diagnostics} & {*LOST}
-    }
-    return frozenset(beside | failed)
-
-
-def limit_table(findings: ExperimentResult, name: str) -> Table:
-    """Return the table of a limit, one row per run and setting of the other axes."""
-    planned, spec = findings.planned, findings.spec.limits[name]
-    assert planned is not None
-    limits = limits_of(findings, spec)
-    others = [axis if axis == RUN else f"{axis}{planned.axis_unit(axis)}" for axis in limits[0].others]
-    title, headings = f"{spec.says}{planned.axis_unit(spec.of)}", [*others, "up to", "no longer at"]
-    table = Table(title, headings, numbers={len(others), len(others) + 1})
-    for limit in limits:
-        words: list[Cell] = [level.words for level in limit.others.values()]
-        up_to = "-" if limit.largest is None else digits_of(limit.largest)
-        beyond = "-" if limit.beyond is None else digits_of(limit.beyond)
-        if limit.missing:
-            beyond = f"unknown ({beyond} not made)"
-        elif why := limit.verdict.why:
-            beyond = f"{beyond} ({why})"
-        table.rows.append([*words, up_to, beyond])
-    return table

@@ -13,6 +13,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
+from pydantic import BaseModel, Field, create_model
+
 from yawbench.foundation.errors import ScenarioError
 from yawbench.foundation.messages import hint, short
 from yawbench.foundation.safe_files import reads
@@ -22,12 +24,22 @@ from yawbench.orchestrator.scenario.schema_validation import validated
 from yawbench.orchestrator.scenario.yaml_lines import Document, KeyPath
 from yawbench.orchestrator.signal_names import Target
 
-from .axes import RUN, changes_of_file, levels_of, names_of
-from .claim_schema import Claim, DerivedSpec, MetricReference, text_of
-from .claims import cells
+from .axes import changes_of_file
+from .claim_schema import Claim, DerivedSpec
 from .experiment import FIGURES, LoadedExperiment, NamedRun
-from .schema import ChoiceSpec, ExperimentSpec, FigureSpec, RunSpec
+from .references import problems_of
+from .schema import ChoiceSpec, ExperimentSpec, RunSpec
+from .sections import sections
 
+_ADDED: dict[str, Any] = {
+    name: (list[section.entry], Field([], description=section.says))  # type: ignore[name-defined]
+    for name, section in sections().items()
+}
+ExperimentFile = create_model(
+    "ExperimentSpec", __base__=ExperimentSpec, __doc__=ExperimentSpec.__doc__, __module__=__name__,
+    __qualname__="ExperimentFile", **_ADDED,
+)  # fmt: skip
+"""Schema of experiment files, with the sections that parts add."""
 SENTENCES = ("says", "short", "source", "note")
 """Fields of claims and derived numbers that are prose, where `{name}` becomes the label of a value."""
 MOST = 10_000
@@ -73,7 +85,7 @@ def load_experiment(path: Path | str, *, changes: Sequence[Override] = ()) -> Lo
     path = Path(path)
     document = yaml_lines.read(path, what="experiment file")
     overrides.apply_to_all_runs(document, changes)
-    spec = validated(ExperimentSpec, document)
+    spec = validated(ExperimentFile, document)
     spec = expanded(spec, document)
     runs = {"": NamedRun("", "", "", path.parent / spec.scenario, ())} if spec.scenario else {}
     for i, entry in enumerate(spec.runs):
@@ -90,11 +102,10 @@ def load_experiment(path: Path | str, *, changes: Sequence[Override] = ()) -> Lo
     own = changes_of_file(spec, path.parent, "sweep" if spec.axes else "study")
     for_all = tuple(change for change in own if change.target not in overridden)
     experiment = LoadedExperiment(path, spec, runs, for_all, tuple(overridden.values()))
-    if not document.errors:
-        check_axes(spec, document)
-        check_names(experiment, document)
+    for problem in problems_of(spec, runs) if not document.errors else ():
+        document.report(*problem)
     document.raise_errors()
-    _ = experiment.recordings  # a mistake in a measurement file is told before the runs are made
+    _ = experiment.loaded_sections  # a mistake in a file that they name is told before the runs are made
     return experiment
 
 
@@ -118,19 +129,19 @@ class ForBinding:
         return re.sub(r"\{(\w+)\}", lambda match: use.get(match[1], match[0]), text)
 
     def filled(self, entry: Texts) -> Texts:
-        """Return the entry with all its texts filled in."""
+        """Return the entry, which is valid already, with all its texts filled in."""
 
         def fill(part: Any, name: str = "") -> Any:
+            if isinstance(part, BaseModel):
+                given = part.model_fields_set - {"for_each"}
+                return part.model_copy(update={field: fill(getattr(part, field), field) for field in given})
             if isinstance(part, dict):
                 return {k: fill(v, k) for k, v in part.items()}
             if isinstance(part, list):
                 return [fill(v, name) for v in part]
             return self.fill(part, sentence=name in SENTENCES) if isinstance(part, str) else part
 
-        if not self.values:
-            return entry
-        fields = entry.model_dump(by_alias=True, exclude_defaults=True, exclude={"for_each"})
-        return type(entry).model_validate(fill(fields))
+        return fill(entry).model_copy(update={"for_each": {}}) if self.values else entry
 
 
 def fillings(
@@ -211,194 +222,3 @@ def _check_folder(name: str, binding: ForBinding) -> None:
     if any(len(part) > LONGEST for part in parts):
         sentence = f"{short(name)} is too long: at most {LONGEST} characters between two /"
     binding.document.report((*binding.key, "name"), sentence, "name-duplicate")
-
-
-COLUMNS = (RUN, "status", "reason", "warnings", "key")
-"""Columns of the table besides axes and metrics."""
-
-
-def check_axes(spec: ExperimentSpec, document: Document) -> None:
-    """Report targets that two axes, or an axis and `set` or `swap`, override."""
-    seen: dict[Target, str] = dict.fromkeys(spec.targets, "set and swap")
-    for name, axis in spec.axes.items():
-        for target in axis.targets:
-            if target in seen:
-                also = f"axis {seen[target]!r}" if seen[target] in spec.axes else "set or swap"
-                document.report(("axes", name), f"{target} is given by {also} already", "name-duplicate")
-            seen[target] = name
-    for group, names in (("axes", spec.axes), ("metrics", spec.metrics)):
-        for name in names:
-            if name in COLUMNS or (group == "axes" and name in spec.metrics):
-                document.report(
-                    (group, name), f"{name!r} is the name of another column of the table", "name-duplicate"
-                )
-
-
-def check_names(experiment: LoadedExperiment, document: Document) -> None:
-    """Report every reference to a run, metric, axis or number that does not exist."""
-    spec, runs = experiment.spec, experiment.runs
-    known: dict[str, tuple[Mapping[str, object], str]] = {
-        "run": (runs, "runs"),
-        "metric": (spec.metrics, "metrics"),
-        "axis": (spec.axes, "axes"),
-        "derived number": (spec.derived, "there are"),
-        "grid": (spec.grids, "grids"),
-        "limit": (spec.limits, "limits"),
-        "open value": (spec.region.open_values if spec.region else {}, "open values"),
-    }
-    for what, name, key in itertools.chain(_names(spec), _names_of_conditions(experiment, document)):
-        names, lead = known[what]
-        if name not in names:
-            document.report(key, f"there is no {what} {name!r}{hint(name, names, lead=lead)}", "name-unknown")
-    for patterns, key in _patterns(spec):
-        for k, pattern in enumerate(patterns):
-            if not experiment.matching([pattern]):
-                sentence = f"no run is named {pattern!r}{hint(pattern, runs, lead='runs')}"
-                document.report((*key, "runs", k), sentence, "name-unknown")
-    _check_correlations(spec, document)
-    _check_limits(spec, document)
-    for i, figure in enumerate(spec.figures):
-        _check_figure(spec, document, i, figure)
-
-
-def _names(spec: ExperimentSpec) -> Iterator[tuple[str, str, KeyPath]]:
-    """Yield (kind, name, key) of all references except patterns of runs."""
-    for i, table in enumerate(spec.tables):
-        for k, name in enumerate(table.metrics):
-            yield "metric", name, ("tables", i, "metrics", k)
-    for name, grid in spec.grids.items():
-        for cell in cells(grid):
-            what, named = ("derived number", cell.metric) if grid.derived else ("run", cell.run)
-            yield what, named, ("grids", name)
-        if grid.metric:
-            yield "metric", grid.metric, ("grids", name, "metric")
-    for name, number in spec.derived.items():
-        for word, source in number.of.items():
-            yield "run", source.run, ("derived", name, "of", word, "run")
-            yield "metric", source.metric, ("derived", name, "of", word, "metric")
-        if number.rank_correlation is not None:
-            yield "grid", number.rank_correlation, ("derived", name, "rank_correlation")
-    for group, i, claim in spec.assertions():
-        for k, name in enumerate(claim.open_values or ()):
-            yield "open value", name, (group, i, "open_values", k)
-    if spec.tuning:
-        yield "derived number", spec.tuning.objective, ("tuning", "objective")
-    for i, validation in enumerate(spec.validations):
-        yield "run", validation.run, ("validations", i, "run")
-    for name, limit in spec.limits.items():
-        yield "axis", limit.of, ("limits", name, "of")
-    for i, figure in enumerate(spec.figures):
-        for name, axis in figure.axes.items():
-            if axis != RUN or not spec.runs:
-                yield "axis", axis, ("figures", i, name)
-        for axis in figure.only:
-            yield "axis", axis, ("figures", i, "only", axis)
-        for what in ("metric", "limit", "grid"):
-            if name := getattr(figure, what):
-                yield what, name, ("figures", i, what)
-
-
-def _names_of_conditions(
-    experiment: LoadedExperiment, document: Document
-) -> Iterator[tuple[str, str, KeyPath]]:
-    """Yield the references in conditions likewise; report conditions without a run."""
-    for key, condition in experiment.spec.conditions():
-        if condition.derived:
-            yield "derived number", condition.derived, (*key, "derived")
-            continue
-        if not condition.run and experiment.spec.runs and key[0] != "limits":
-            document.report(key, "needs run and metric, or derived in place of both", "figure-invalid")
-            continue
-        if condition.run and not experiment.matching([condition.run]):
-            yield "run", condition.run, (*key, "run")
-        yield "metric", condition.metric, (*key, "metric")
-        if isinstance(condition.bound, MetricReference):
-            yield "run", condition.bound.run, (*key, condition.relation, "run")
-            yield "metric", condition.bound.metric, (*key, condition.relation, "metric")
-
-
-def _patterns(spec: ExperimentSpec) -> Iterator[tuple[Sequence[str], KeyPath]]:
-    """Yield (patterns of runs, key of the part that has them)."""
-    for name, axis in spec.axes.items():
-        yield axis.runs, ("axes", name)
-    for i, table in enumerate(spec.tables):
-        yield table.runs, ("tables", i)
-    for name, open_value in spec.region.open_values.items() if spec.region else ():
-        yield open_value.runs, ("region", "open_values", name)
-    if spec.tuning:
-        yield spec.tuning.runs, ("tuning",)
-    for i, figure in enumerate(spec.figures):
-        yield figure.runs, ("figures", i)
-
-
-def _check_correlations(spec: ExperimentSpec, document: Document) -> None:
-    """Report rank correlations over rows, columns or published numbers that the grid lacks."""
-    for name, number in spec.derived.items():
-        grid = spec.grids.get(number.rank_correlation or "")
-        if grid is None:
-            continue
-        axes = {**grid.rows, **grid.columns}
-        for axis, counted in number.only.items():
-            where: KeyPath = ("derived", name, "only", axis)
-            if axis not in axes:
-                document.report(
-                    where, f"there is no axis {axis!r}{hint(axis, axes, lead='the grid has')}", "axis-unknown"
-                )
-                continue
-            for part in (part for part in counted if part not in axes[axis]):
-                guess = hint(part, axes[axis], lead=f"{axis} has")
-                document.report(where, f"there is no value {part!r}{guess}", "name-unknown")
-        if all(cell.published is None for cell in cells(grid)):
-            sentence = f"grid {number.rank_correlation!r} has no published numbers to compare with"
-            document.report(("derived", name, "rank_correlation"), sentence, "figure-invalid")
-
-
-def _check_limits(spec: ExperimentSpec, document: Document) -> None:
-    """Report limits of axes that cannot have one."""
-    for name, limit in spec.limits.items():
-        if limit.of in spec.axes and not spec.axes[limit.of].numeric:
-            document.report(
-                ("limits", name, "of"), f"the values of {limit.of!r} must be numbers", "figure-invalid"
-            )
-        if limit.of in spec.repeats:
-            document.report(("limits", name, "of"), f"numbers are means over {limit.of!r}", "figure-invalid")
-        if spec.design != "grid":
-            document.report(("limits", name), "limits need a grid", "figure-invalid")
-
-
-def _check_figure(spec: ExperimentSpec, document: Document, i: int, figure: FigureSpec) -> None:
-    """Report a name that is taken, unknown values in `only`, and axes that are not shown, or shown twice."""
-
-    def report(sentence: str, *where: str, code: str = "figure-invalid") -> None:
-        document.report(("figures", i, *where), sentence, code)
-
-    if figure.name in [other.name for other in spec.figures[:i]]:
-        report(f"there is already a figure {figure.name!r}", "name", code="name-duplicate")
-    if figure.what.shows == "runs" and spec.axes:
-        report("runs along axes are drawn as curve, map or limit", "kind")
-    for name, chosen in figure.only.items():
-        axis = spec.axes.get(name)
-        if axis is None or (spec.design == "latin_hypercube" and axis.numeric):
-            continue
-        levels = levels_of(axis)
-        names = {text for level in levels for text in names_of(axis, level)}
-        for value in (value for value in chosen if text_of(value) not in names):
-            guess = hint(text_of(value), [text_of(level.value) for level in levels], lead="it has")
-            report(f"{name} has no value {value!r}{guess}", "only", name)
-    if not figure.what.over_axes:
-        return
-    used = {*figure.axes.values()}
-    for key, name in figure.axes.items():
-        if name in spec.repeats:
-            report(f"numbers are means over {name!r}", key)
-        if key in "xy" and name in spec.axes and figure.what.upwards and not spec.axes[name].numeric:
-            report(f"the values of {name!r} must be numbers")
-    if figure.limit in spec.limits:
-        of = spec.limits[figure.limit].of
-        if of in used:
-            report(f"{of!r} is the axis of the limit {figure.limit!r}")
-        used.add(of)
-    shown = used | {*spec.repeats}
-    left = [name for name in (*spec.axes, *([RUN] if spec.runs else [])) if name not in shown]
-    if spec.design == "grid" and left and not document.errors:
-        report(f"the axis {left[0]!r} is not used in this figure: assign it to lines or panels")

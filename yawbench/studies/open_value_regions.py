@@ -24,11 +24,13 @@ from yawbench.planner import Planner
 
 from .axes import DesignPoint, Level, OpenValueSpec, OpenVariantSpec, changes_at, latin_hypercube, levels_of
 from .claim_schema import Claim, MetricReference
-from .claims import ONE_IN, TIMES, ClaimResult, LevelVerdict, OpenValueScan, Region, judge, ranked
+from .claims import judge
 from .confidence import Decision, SequentialTest
+from .derived import derive, ranked
 from .experiment import RUNS, LoadedExperiment, NamedRun, PlannedExperiment, metrics_of, number_of
-from .experiment_result import ExperimentResult, derive
+from .experiment_result import ExperimentResult
 from .jobs import Job, MeasuredRun, keyed, ready
+from .region_verdicts import ONE_IN, TIMES, LevelVerdict, OpenValueScan, Region
 
 ORIGIN: Final = "region"
 """Origin of overrides that open values make."""
@@ -304,9 +306,9 @@ def next_jobs(
     return made
 
 
-def _at_chosen(findings: ExperimentResult, key: RegionKey) -> ClaimResult:
-    """Return a claim or check with its verdict at the chosen point."""
-    return (findings.claims if key[0] == "claims" else findings.checks)[key[1]]
+def _at_chosen(findings: ExperimentResult, key: RegionKey) -> Verdict:
+    """Return the verdict on a claim or check at the chosen point."""
+    return (findings.claims if key[0] == "claims" else findings.checks)[key[1]].verdict
 
 
 def _further_points(
@@ -316,8 +318,8 @@ def _further_points(
     question, chosen = plan.questions[key], _at_chosen(findings, key)
     verdicts = plan.verdicts.setdefault(key, [])
     for look in plan.test.looks:
-        flips = sum(verdict.holds != chosen.verdict.holds for verdict in verdicts)
-        if plan.test.decision(flips, len(verdicts)) is not Decision.OPEN or chosen.verdict.holds is None:
+        flips = sum(verdict.holds != chosen.holds for verdict in verdicts)
+        if plan.test.decision(flips, len(verdicts)) is not Decision.OPEN or chosen.holds is None:
             break
         points = question.points[len(verdicts) : look]
         if any(
@@ -382,7 +384,7 @@ def judge_region(
 def _verdict_at(
     plan: RegionPlan,
     question: RegionQuestion,
-    chosen: ClaimResult,
+    chosen: Verdict,
     findings: ExperimentResult,
     records: Mapping[str, MeasuredRun],
     point: RegionPoint,
@@ -420,9 +422,9 @@ def _judged(
                 judged.append(LevelVerdict(level.words, number, verdict))
         unit, factor = _shown(runs, name, question.runs) if open_value.numeric else ("", 1.0)
         at = runs.chosen_number(name, question.runs) if open_value.numeric else None
-        as_chosen = LevelVerdict("as chosen", at, chosen.verdict)
+        as_chosen = LevelVerdict("as chosen", at, chosen)
         lines.append(OpenValueScan(name, open_value.says or name, unit, factor, as_chosen, tuple(judged)))
-    return Region(chosen.verdict, tuple(plan.verdicts[key]), tuple(lines), plan.test)
+    return Region(chosen, tuple(plan.verdicts[key]), tuple(lines), plan.test)
 
 
 def _shown(runs: RegionRuns, key: str, names: Iterable[str]) -> tuple[str, float]:

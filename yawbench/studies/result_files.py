@@ -1,45 +1,34 @@
-"""Files of an experiment's result: its table as CSV and Parquet, verdicts, record as JSON, figures.
+"""Files of an experiment's result: its table as CSV and Parquet, verdicts, record as JSON.
 
-The table has one row per case, in the order of the design; equal runs give equal bytes. Figures are overlaid
-runs, or metrics, limits and grids over axes (`axis_figures`).
+The table has one row per case, in the order of the design; equal runs give equal bytes.
 """
 
 from __future__ import annotations
 
 import json
 import math
-import textwrap
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from yawbench.figures.plots import draw
-from yawbench.figures.style import ROW, LabelledRun, frame, literal, new_figure, save
 from yawbench.foundation.errors import ResultsError
-from yawbench.foundation.messages import counted
 from yawbench.foundation.safe_files import reason, write_whole
 from yawbench.metrics.expressions import MetricValue, metric
 from yawbench.metrics.measures import si
 from yawbench.orchestrator.results.reader import Results
-from yawbench.orchestrator.scenario.overrides import changed
 
-from .axis_figures import FAILED, Drawing
 from .claim_schema import si_number, text_of
-from .claims import ClaimResult, Region
-from .experiment import FIGURES
-from .experiment_result import Each, ExperimentResult, limits_of
-from .result_tables import heading, verdict
-from .schema import FigureSpec
+from .claims import ClaimResult
+from .experiment_result import ExperimentResult
+from .limits import limits_of
+from .region_verdicts import Region
+from .result_tables import heading, measured_words, verdict
 from .tables import Table, column, to_csv
 
 if TYPE_CHECKING:
     import pyarrow as pa
-    from matplotlib.artist import Artist
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 TABLE = "table.csv", "table.parquet"
 VERDICTS = "verdicts.csv"
@@ -224,7 +213,7 @@ def record_of(findings: ExperimentResult, drawn: Mapping[str, str] | None = None
         "derived": {
             key: {
                 "says": number.says,
-                "expression": number.expression,
+                "expression": number.expression and str(number.expression),
                 "of": {word: [source.run, source.metric] for word, source in number.of.items()},
                 "rank_correlation": number.rank_correlation,
                 "published": None if number.published is None else si_number(number.published, number.unit),
@@ -234,7 +223,7 @@ def record_of(findings: ExperimentResult, drawn: Mapping[str, str] | None = None
         },
         "claims": [_judgement(result) for result in findings.claims],
         "checks": [_judgement(result) for result in findings.checks],
-        "validations": [validation.as_data() for validation in findings.validations],
+        **{name: [finding.as_data() for finding in found] for name, found in findings.sections.items()},
         "limits": {
             key: [
                 {
@@ -269,7 +258,7 @@ def _judgement(result: ClaimResult) -> dict[str, Any]:
         "says": result.claim.says,
         "source": result.claim.source,
         "holds_if": [str(condition) for condition in result.claim.holds_if],
-        "measured": list(result.measured),
+        "measured": measured_words(result),
         "holds": result.verdict.holds,
         "verdict": verdict(result),
         **{key: deciding[key] for key in ("value", "relation", "bound", "unit", "margin")},
@@ -309,102 +298,3 @@ def _region(region: Region) -> dict[str, Any]:
 
 def _finite(number: float | None) -> float | str | None:
     return number if number is None or math.isfinite(number) else str(number)
-
-
-PANELS_IN_A_ROW = 3
-
-
-def draw_all(findings: ExperimentResult, out: Path, each: Each = map) -> tuple[dict[str, str], list[str]]:
-    """Draw all figures as SVG and PNG below `out`; return name -> title, and problems.
-
-    Args:
-        findings: result of the experiment.
-        out: results folder of the experiment.
-        each: `map`, or a parallel equivalent.
-    """
-    wanted: list[tuple[Any, FigureSpec, str, Path]] = []
-    light = findings.light()
-    for spec in findings.spec.figures:
-        shown = runs_of(findings, spec) if spec.what.shows == "runs" else light
-        wanted.append((shown, spec, title_of(findings, spec), out / FIGURES / spec.name))
-    drawn, problems = {}, []
-    for (_, spec, title, _), problem in zip(wanted, each(_draw, wanted), strict=True):
-        if problem:
-            problems.append(f"figure {spec.name}: {problem}")
-        else:
-            drawn[spec.name] = title
-    return drawn, problems
-
-
-def title_of(findings: ExperimentResult, spec: FigureSpec) -> str:
-    """Return the title of a figure."""
-    return spec.title or f"{findings.spec.title}: {spec.name}"
-
-
-def runs_of(findings: ExperimentResult, spec: FigureSpec) -> list[LabelledRun]:
-    """Return the runs of an overlay, without those that have no results."""
-    named = findings.experiment.matching(spec.runs)
-    return [
-        LabelledRun(run.label, findings.results[run.name]) for run in named if run.name in findings.results
-    ]
-
-
-def _draw(wanted: tuple[Any, FigureSpec, str, Path]) -> str | None:
-    shown, spec, title, stem = wanted
-    if not shown:
-        return "none of its runs has results"
-    try:
-        overlay = spec.what.shows == "runs"
-        save(draw(shown, spec.panels, title=title) if overlay else draw_over_axes(shown, spec), stem)
-    except ResultsError as error:
-        return str(error)
-    return None
-
-
-def draw_over_axes(findings: ExperimentResult, spec: FigureSpec) -> Figure:
-    """Draw a figure over axes.
-
-    Raises:
-        ResultsError: there is nothing to draw.
-    """
-    drawing: Drawing = resolve_name(f"{__package__}.{spec.what.drawing}")(findings, spec)
-    panels = drawing.panels()
-    columns = min(len(panels), PANELS_IN_A_ROW)
-    rows = math.ceil(len(panels) / columns)
-    height = rows * (1.7 if columns == 1 else 1.4) * ROW
-    with new_figure() as figure:
-        grid = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
-        drawn = list(grid.flat[: len(panels)])
-        for axes in grid.flat[len(panels) :]:
-            axes.remove()
-        for k, (axes, (heading, runs)) in enumerate(zip(drawn, panels, strict=True)):
-            drawing.fill(axes, runs)
-            axes.set_title(literal(heading))
-            if k + columns >= len(drawn):  # the lowest panel of its column
-                axes.set_xlabel(literal(drawing.label(spec.x)) if spec.x else "")
-                axes.tick_params(labelbottom=True)
-            if k % columns == 0:
-                axes.set_ylabel(literal("\n".join(textwrap.wrap(drawing.upwards, 34))))
-        drawing.finish(figure, drawn)
-        options = changed(findings.experiment.by_options)
-        frame(figure, height, _legend(drawn), spec.title or drawing.what, _provenance(findings), options)
-    return figure
-
-
-def _legend(drawn: Sequence[Axes]) -> list[Artist]:
-    """Return one handle per label over all panels, with that of failed runs last."""
-    by_label: dict[str, Artist] = {}
-    for axes in drawn:
-        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
-            by_label.setdefault(label, handle)
-    return sorted(by_label.values(), key=lambda handle: handle.get_label() == FAILED["label"])
-
-
-def _provenance(findings: ExperimentResult) -> str:
-    spec = findings.spec
-    fmus = [f"{name} {digest[:8]}" for name, digest in findings.fmus]
-    scenarios = dict.fromkeys(run.scenario.name for run in findings.experiment.runs.values())
-    made = len(findings.records) - findings.not_made
-    parts = [f"{counted(made, 'run')} of {', '.join(scenarios)}", f"FMUs: {', '.join(fmus)}"]
-    parts += [f"changed in all runs: {words}"] if (words := changed(findings.experiment.changed)) else []
-    return " · ".join([spec.source, *parts] if spec.source else parts)

@@ -1,40 +1,33 @@
-"""Tables of results for people: an experiment's runs, grids, derived numbers, verdicts and limits.
-
-Also the tables of standard tests: all quantities of one run, or a row per run.
-"""
+"""Tables of results for people: an experiment's runs, grids, derived numbers, verdicts and limits."""
 
 from __future__ import annotations
 
 import itertools
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
-from yawbench.figures.style import digits_of, shown
-from yawbench.foundation.errors import text_of
+from yawbench.figures.style import DIGITS, digits_apart, digits_of, shown
+from yawbench.foundation.messages import counted
 from yawbench.metrics.expressions import MetricValue, metric
-from yawbench.metrics.verdict import Status, Verdict
+from yawbench.metrics.verdict import Status, Verdict, VerdictText, worded
 from yawbench.orchestrator.scenario.overrides import changed
-from yawbench.proving_ground.standard_tests import Evaluation, StandardTest, TestQuantity, TestSeries
 
 from .axes import levels_of
 from .claim_schema import GridSpec, MetricReference, MetricSpec, si_number
-from .claims import ClaimResult, GridCell, cells, correlation, ranked
+from .claims import ClaimResult, Comparison, RunValue
 from .confidence import Bounds
-from .experiment import NamedRun, validating
-from .experiment_result import ExperimentResult, limit_table
+from .derived import GridCell, cells, correlation, ranked
+from .experiment import NamedRun
+from .experiment_result import ExperimentResult
 from .jobs import NOT_MADE
+from .limits import limit_table
 from .schema import TableSpec
+from .sections import sections
 from .tables import Cell, Column, Table, marked, remarks
 
-HOLDS, SENSITIVE, UNDECIDED, NOT_JUDGED = (
-    "holds",
-    Status.SENSITIVE.value,
-    Status.UNDECIDED.value,
-    Status.NOT_JUDGED.value,
-)
 CARRIES = ("margin", "region", "nearest flip")
 """Headings about the robustness of a verdict; the last two need a region."""
-FAILS = {"claims": "does not reproduce", "checks": "does not hold"}
 
 
 def all_tables(findings: ExperimentResult) -> list[Table]:
@@ -43,7 +36,7 @@ def all_tables(findings: ExperimentResult) -> list[Table]:
         *run_tables(findings),
         *derived_tables(findings),
         *claim_tables(findings),
-        *(validating().table(validation) for validation in findings.validations),
+        *(sections()[name].table(one) for name, found in findings.sections.items() for one in found),
         *limit_tables(findings),
     ]
 
@@ -112,9 +105,8 @@ def _display_table(
     for result in findings.judgements if spec.holds else ():
         about = {(c.run, c.derived or c.metric) for c in result.claim.holds_if}
         if len(about) == 1:
-            word = verdict(result)
             (key,) = about
-            signs[key] = signs.get(key) or ("" if word == HOLDS else "✗" if word in FAILS.values() else "?")
+            signs[key] = signs.get(key) or {Status.PASSED: "", Status.FAILED: "✗"}.get(result.status, "?")
 
     def number(cell: GridCell) -> str:
         value = findings.values_of_grids.get(cell.key)
@@ -177,10 +169,41 @@ def heading(spec: MetricSpec) -> str:
     return f"{metric(spec.metric).formula}{spec.during()}"
 
 
-def verdict(judgement: ClaimResult) -> str:
-    """Return the verdict on a claim or check as text."""
-    words = {Status.PASSED: HOLDS, Status.FAILED: FAILS[judgement.group]}
-    return words.get(judgement.status, judgement.status.value)
+def verdict(result: ClaimResult) -> VerdictText:
+    """Return the verdict on a claim or check in words."""
+    return worded(result.status, result.group)
+
+
+def measured_words(result: ClaimResult) -> list[str]:
+    """Return what was measured for each condition of a claim; along axes, where the claim holds."""
+    if result.held_at:
+        return [f"holds at {result.held_at[0]} of {counted(result.held_at[1], 'point')}"]
+    return [*dict.fromkeys(map(_comparison_words, result.compared))]
+
+
+def _comparison_words(comparison: Comparison) -> str:
+    """Return the numbers of a condition, against that of the run that is its bound: `5 % against 3 %`."""
+    other, unit, bound = comparison.taken_from, comparison.unit, comparison.bound
+    numbers = [one.value.number for one in comparison.measured if one.value]
+    near = [(number, bound) for number in numbers] if bound is not None else []
+    digits = digits_apart(near, unit) if numbers else DIGITS
+    text = _range(comparison.measured, digits)
+    if other is None:
+        return text
+    times = comparison.condition.bound.times
+    factor = f"{times:g} × " if other.value and times != 1.0 else ""
+    return f"{text} against {factor}{_range([other], digits)}"
+
+
+def _range(measured: Sequence[RunValue], digits: int) -> str:
+    """Return the value as text, or the smallest and largest with their runs where they read differently."""
+    known = sorted(((one.value, one.label) for one in measured if one.value), key=lambda pair: pair[0].number)
+    ends: dict[str, str] = {}
+    for value, label in (*known[:1], *known[-1:]):
+        text = shown(value.number, value.shown_in, digits=digits, half=value.half, between=value.between)
+        ends.setdefault(text, label)
+    text = " to ".join(f"{number} ({label})" if label else number for number, label in ends.items())
+    return " and ".join(filter(None, [text, "no result" if len(known) < len(measured) else ""]))
 
 
 def margin_words(verdict: Verdict) -> str | None:
@@ -241,9 +264,8 @@ def flip_words(says: str, level: str, chosen: str = "") -> str:
 
 def counts_of(judgements: Sequence[ClaimResult]) -> dict[str, int]:
     """Return verdict -> number of judgements, of the verdicts that occur."""
-    words = [verdict(result) for result in judgements]
-    every = (HOLDS, *FAILS.values(), SENSITIVE, UNDECIDED, NOT_JUDGED)
-    return {word: words.count(word) for word in every if word in words}
+    words = sorted(map(verdict, judgements), key=lambda word: [*Status].index(word.status))
+    return dict(Counter(words))
 
 
 def run_tables(findings: ExperimentResult) -> list[Table]:
@@ -274,7 +296,7 @@ def _run_table(findings: ExperimentResult, spec: TableSpec) -> Table:
         if not findings.made(run, setting):
             cells: list[Cell] = [NOT_MADE.status, *[None] * (len(table.headings) - 2)]
         elif why := findings.failure(run, setting):
-            cells = ["failed", *[None] * (len(table.headings) - 2)]
+            cells = [worded(Status.FAILED), *[None] * (len(table.headings) - 2)]
             table.notes.append(f"{row}: {why}")
         else:
             cells = [findings.at[setting].get((run.name, key)) for key in spec.metrics]
@@ -299,7 +321,8 @@ def _beside(judged: Sequence[ClaimResult], carries: int) -> list[Cell]:
         for result in judged
     ]
     columns: Iterable[Sequence[str | None]] = zip(*rows, strict=True) if rows else [()] * (2 + carries)
-    return ["; ".join(filter(None, column)) or None for column in columns]
+    known = [[text for text in column if text] for column in columns]
+    return [texts[0] if len(texts) == 1 else "; ".join(texts) or None for texts in known]
 
 
 def _claims_of(findings: ExperimentResult, run: NamedRun, table: TableSpec) -> list[ClaimResult]:
@@ -380,45 +403,9 @@ def claim_tables(findings: ExperimentResult) -> list[Table]:
                 )
                 note = f"\n{result.claim.note}" if result.claim.note else ""
                 carries = _carries(result, len(table.headings) - 3)
-                table.rows.append([f"{says}{note}", "\n".join(result.measured), verdict(result), *carries])
+                numbers = "\n".join(measured_words(result))
+                table.rows.append([f"{says}{note}", numbers, verdict(result), *carries])
         if not findings.regions and judged is findings.claims and (only := reach(findings)):
             table.notes.append(f"verdicts: {only}")
         tables += [table] if table.rows else []
     return tables
-
-
-def _cell(quantity: TestQuantity | None) -> Cell:
-    if quantity is None or quantity.value is None:
-        return None
-    return MetricValue(quantity.value, quantity.shown_in)
-
-
-def run_table(judged: Evaluation, title: str) -> Table:
-    """Return the table of a standard test's run: a row per quantity with its reading, verdicts as notes."""
-    rows: list[Sequence[Cell]] = [
-        [quantity.name, _cell(quantity), quantity.reading] for quantity in judged.quantities.values()
-    ]
-    notes = [f"{name}: {result}" for name, result in judged.criteria.items()]
-    return Table(
-        f"{judged.label}: {title}",
-        ["quantity", "value", "reading"],
-        rows,
-        [*notes, *map(str, judged.diagnostics)],
-    )
-
-
-def runs_table(runs: Sequence[Evaluation], test: StandardTest, series: TestSeries | None) -> Table:
-    """Return the table of a standard test's runs, in the given order, with the series' verdict as notes."""
-    keys = [key for key in test.columns if any(key in run.quantities for run in runs)]
-    names = {key: run.quantities[key].name for run in reversed(runs) for key in keys if key in run.quantities}
-    criteria = list(dict.fromkeys(name for run in runs for name in run.criteria))
-    rows: list[Sequence[Cell]] = []
-    for run in runs:
-        words = [run.criteria[name].status.value if name in run.criteria else "-" for name in criteria]
-        rows.append([run.label, *(_cell(run.quantities.get(key)) for key in keys), *words])
-    notes = []
-    if series:
-        notes += [f"{name}: {result}" for name, result in series.criteria.items()]
-        notes.append(series.summary)
-    notes += [f"{run.label}: {text_of(run.diagnostics)}" for run in runs if run.diagnostics]
-    return Table(test.says, ["run", *(names[key] for key in keys), *criteria], rows, notes)

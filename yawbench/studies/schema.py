@@ -59,11 +59,6 @@ column's cells hold.
         for: {fault: {frozen: gyro frozen}}
         holds_if: [{run: "{fault}", metric: sideslip, at_most: 5 deg}]
 
-A validation compares a run with measurements of the car (`docs/measured_cars.md`).
-
-    validations:
-      - {run: ramp, measured: measured.yaml, bands: steady_state}
-
 A verdict at one point may flip nearby. A region names the values that the paper leaves open, each with a
 range; claims are judged again along each of them, and at the points of a Latin hypercube over all together.
 
@@ -155,13 +150,15 @@ from .claim_schema import (
     Assertion,
     Claim,
     Condition,
+    DerivedKey,
     DerivedSpec,
     GridSpec,
     LimitSpec,
+    MetricKey,
     MetricSpec,
+    NameOf,
     Patterns,
     QuantityText,
-    ValidationSpec,
     alternatives,
 )
 
@@ -213,7 +210,7 @@ class LawSpec(OverrideSpec):
 class TuningSpec(StrictModel):
     """A search for parameters that minimize an objective, with the same budget for all laws."""
 
-    objective: str = Field(description="Key of `derived` to minimize")
+    objective: DerivedKey = Field(description="Key of `derived` to minimize")
     population: int = Field(description="Trials of a generation", ge=5)
     generations: int = Field(description="With the first", ge=1)
     seed: int = Field(description="Of the random numbers", ge=0)
@@ -239,7 +236,9 @@ class TableSpec(StrictModel):
 
     title: str = ""
     runs: Patterns
-    metrics: list[str] = Field(description="Keys of `metrics`, one column each", min_length=1)
+    metrics: Annotated[list[str], NameOf("metric")] = Field(
+        description="Keys of `metrics`, one column each", min_length=1
+    )
 
 
 @dataclass(frozen=True)
@@ -266,12 +265,14 @@ FIGURE_KINDS = {
 """Name -> kind of figure."""
 
 
+ShownAxis = Annotated[str, NameOf("axis or run")]
 Chosen = Annotated[
     list[Scalar],
     BeforeValidator(
         lambda value: value if isinstance(value, list) else [value],
         json_schema_input_type=list[Scalar] | Scalar,
     ),
+    Field(min_length=1),
 ]
 
 
@@ -281,21 +282,25 @@ class FigureSpec(StrictModel):
     name: str = Field(description="Name of its files", pattern=r"^[\w.+-]+$")
     title: str = ""
     kind: Annotated[str, OneOf(FIGURE_KINDS)] = Field("overlay", description=listed(FIGURE_KINDS, last="or"))
-    runs: list[str] = Field([], description="Of an overlay: names of runs, with `*` and `?` for many")
+    runs: Annotated[list[str], NameOf("runs")] = Field(
+        [], description="Of an overlay: names of runs, with `*` and `?` for many"
+    )
     panels: list[str] | str = Field(
         list(OVERVIEW),
         description="Of an overlay, in order: a signal, its error (`x_error`), one over another (`y(x)`) or "
         "`path`; of others: axis with a panel per value",
     )
-    metric: str = Field("", description="Key of `metrics`, for curves and maps")
-    limit: str = Field("", description="Key of `limits`, for a limit")
-    grid: str = Field(
+    metric: MetricKey = Field("", description="Key of `metrics`, for curves and maps")
+    limit: Annotated[str, NameOf("limit")] = Field("", description="Key of `limits`, for a limit")
+    grid: Annotated[str, NameOf("grid")] = Field(
         "", description="Key of `grids`, for a line (with `holds`) or markers per column over the rows"
     )
-    x: str = Field("", description="Horizontal axis")
-    y: str = Field("", description="Vertical axis, of a map")
-    lines: str = Field("", description="Axis with a line per value, of curves and limits")
-    only: dict[str, Chosen] = Field({}, description="Axis -> that of its values, or those, which are drawn")
+    x: ShownAxis = Field("", description="Horizontal axis")
+    y: ShownAxis = Field("", description="Vertical axis, of a map")
+    lines: ShownAxis = Field("", description="Axis with a line per value, of curves and limits")
+    only: Annotated[dict[str, Chosen], NameOf("axis")] = Field(
+        {}, description="Axis -> that of its values, or those, which are drawn"
+    )
     scale: Literal["linear", "log"] = Field("linear", description="Of the metric")
     largest: QuantityText | None = Field(None, description="Upper end of the metric's scale")
     mark: QuantityText | None = Field(None, description="A value of the metric to draw a line at")
@@ -378,7 +383,6 @@ class ExperimentSpec(OverrideSpec):
     claims: list[Claim] = Field([], description="Claims of the paper")
     checks: list[Claim] = Field([], description="Checks of this project on its results")
     region: RegionSpec | None = Field(None, description="Open values over which claims are judged again")
-    validations: list[ValidationSpec] = Field([], description="Runs to be compared with measured cars")
     limits: dict[str, LimitSpec] = {}
     figures: list[FigureSpec] = []
     keep: Literal["limits", "all", "none"] = Field(
@@ -394,8 +398,6 @@ class ExperimentSpec(OverrideSpec):
             raise ValueError("needs either a scenario or runs")
         if self.scenario and not self.axes and not self.tuning:
             raise ValueError("a single run needs axes")
-        if self.validations and self.axes:
-            raise ValueError("validations: of named runs, not of runs along axes")
         if self.region and self.axes:
             raise ValueError("region: runs along axes have none; it is for named runs at one point")
         if self.tuning and (self.axes or self.region):

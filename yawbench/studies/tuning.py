@@ -23,9 +23,9 @@ from yawbench.metrics.expressions import MetricValue
 from yawbench.orchestrator.signal_names import Target
 
 from .axes import DesignAxisSpec, OverrideSpec, VariantSpec, level_at
-from .claims import MetricTable
+from .derived import MetricTable, derive
 from .experiment import LoadedExperiment
-from .experiment_result import ExperimentResult, derive
+from .experiment_result import ExperimentResult
 from .tables import Table, column
 
 if TYPE_CHECKING:
