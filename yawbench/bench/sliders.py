@@ -305,7 +305,7 @@ class Bench:
             self._turn.release()
         if not outcome.ok:
             raise YawbenchError(list(outcome.diagnostics))
-        (packed,) = pack([outcome.value], raw=True)
+        (packed,) = pack([outcome.value], exact=True)
         self._kept[job.key] = outcome.value, replace(packed, address=f"block/{job.key}")
         while len(self._kept) > KEPT:
             self._kept.popitem(last=False)

@@ -271,8 +271,7 @@ class Viewer extends InAddress {
 
   // See `Run.grain`.
   grain(run, name) {
-    if (!this.state.difference || run === this.baseline) return run.grain(name);
-    return run.rounding(name) + this.baseline.rounding(name);
+    return run.grain(name) + (this.state.difference && run !== this.baseline ? this.baseline.grain(name) : 0);
   }
 
   // The signals of a text of the reader, by name, by variable, by label or by a part of one, as a panel names them.
