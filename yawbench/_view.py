@@ -13,7 +13,6 @@ from yawbench.foundation.messages import counted, listed
 from yawbench.foundation.safe_files import reason, write_whole
 from yawbench.metrics.expressions import columns_of
 from yawbench.orchestrator.scenario.overrides import changed
-from yawbench.reports.page_parts import packed
 from yawbench.reports.viewer import SETTINGS, Settings, page
 from yawbench.reports.viewer import View as Selection
 
@@ -68,7 +67,7 @@ def view(
         len(names) != 1 or names[0] != labelled[0].results.record.title
     ):  # a single run's own title is followed by its overrides
         title = title or listed(names, last="and")
-    html = packed(page(labelled, settings, title=title))
+    html = page(labelled, settings, title=title)
     return View(names, html, arguments.count(height, "height", least=LEAST, most=MOST))
 
 

@@ -19,7 +19,8 @@ from yawbench.figures.style import shown
 from yawbench.foundation.errors import Diagnostic, ScenarioError
 from yawbench.metrics.expressions import MetricValue
 from yawbench.orchestrator.plan import Override
-from yawbench.reports.study_page import chapter, study_page, viewer_of
+from yawbench.reports.page_parts import render
+from yawbench.reports.study_page import chapter, viewer_of
 from yawbench.studies.claim_schema import Claim, GridSpec, calculate, rank_correlation
 from yawbench.studies.claims import correlation, judge
 from yawbench.studies.experiment_result import judge_results
@@ -99,8 +100,8 @@ def problems(study, *changes):
 
 def page(findings, out) -> str:
     """Return what a reader of the experiment's page sees."""
-    facts = chapter(findings, command="yawbench study", stale={}, folder=out)
-    text = study_page(facts)
+    view = chapter(findings, command="yawbench study", stale={}, folder=out)
+    text = render(view)
     return " ".join(" ".join(html.fromstring(text).itertext()).split())
 
 

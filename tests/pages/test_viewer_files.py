@@ -91,9 +91,7 @@ def test_files_of_a_difference_say_so(shown, chromium, three):
     of_b = [row for row in rows if row["run"].startswith(B)]
     expected = whole_car(2.0)["plant.yaw_rate"] - whole_car()["plant.yaw_rate"]
     values = [float(row["plant.yaw_rate [rad/s]"]) for row in of_b]
-    step = (
-        np.ptp([whole_car(2.0)["plant.yaw_rate"].max(), whole_car(2.0)["plant.yaw_rate"].min()]) / COARSE
-    )
+    step = np.ptp([whole_car(2.0)["plant.yaw_rate"].max(), whole_car(2.0)["plant.yaw_rate"].min()]) / COARSE
     np.testing.assert_allclose(values, expected, atol=2.0 * step)
     assert "reference.yaw_rate_ref [rad/s]" not in rows[0]
 

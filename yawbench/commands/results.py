@@ -359,7 +359,7 @@ def write_view(
         ResultsError: a run cannot be read, or the page cannot be written.
     """
     from yawbench.figures.style import LabelledRun
-    from yawbench.reports.page_parts import save_page
+    from yawbench.foundation.safe_files import write_whole
     from yawbench.reports.viewer import SETTINGS, Settings, View, page
 
     read = read_runs(folders, start)
@@ -367,7 +367,7 @@ def write_view(
     text = page(runs, Settings((View(panels=panels),)) if panels else SETTINGS)
     file = out or folder_of_all(folders) / "view.html"
     try:
-        save_page(file, text, named=out is not None)
+        write_whole(file, text, named=out is not None)
     except OSError as error:
         raise ResultsError(
             f"{file}: cannot write the page: {error.strerror or error}", code="results-unwritable"

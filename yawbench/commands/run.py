@@ -6,7 +6,7 @@ import contextlib
 import textwrap
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -196,8 +196,10 @@ def compare(
     Without --out, results go to results/<folder of the scenario>/<its name>-compare. A run that
     fails is reported; the other runs continue.
     """
+    from dataclasses import replace
+
     from yawbench.orchestrator.results.run_folder import default_folder
-    from yawbench.reports.comparison import comparison_facts
+    from yawbench.reports.comparison import comparison_view
     from yawbench.studies.scenario_experiments import comparison, comparison_table
 
     recordings = labelled_recordings(measured, begin)
@@ -208,10 +210,10 @@ def compare(
     print_tables([comparison_table(findings)])
     beside = {"measured": measured, "from": [begin]} if measured else {}
     command = command_of("compare", scenario, **options.changing | {"swap": swap} | beside)
-    facts = comparison_facts(findings)
-    views = facts["views"] if facts else []
-    chapter = chapter_of(findings, folder, command, views=views, measured=recordings, comparison=facts)
-    say_page(write_page(chapter, folder))
+    compared = comparison_view(findings)
+    views = compared.views if compared else []
+    chapter = chapter_of(findings, folder, command, views=views, measured=recordings)
+    say_page(write_page(replace(chapter, comparison=compared), folder))
     output.answer(experiments=[data_of(findings, folder)])
     if findings.failed:
         raise typer.Exit(1)
@@ -312,8 +314,8 @@ def converge(
         figure = convergence_figure(rows, signal, experiment.spec.title, note)
         save(figure, folder / "converge")
         charts = [image_of(folder / "converge.svg", experiment.spec.title)]
-    facts: dict[str, Any] = {"results": [table], "charts": charts}
-    say_page(write_page(chapter_of(findings, folder, command, **facts), folder))
+    chapter = chapter_of(findings, folder, command)
+    say_page(write_page(replace(chapter, results=[table], charts=charts), folder))
     if any(row.failed for row in rows):
         raise typer.Exit(1)
 

@@ -10,11 +10,11 @@ from yawbench.orchestrator.results.reader import Results
 from yawbench.studies.claim_schema import ValidationSpec
 
 from .validation import Bands, Validation, compare_run, load_bands
-from .validation_page import validation_facts, validation_table
+from .validation_page import validation_table, validation_view
 
 Recordings = list[tuple[ValidationSpec, Measurement, Bands]]
 
-table, facts = validation_table, validation_facts
+table, view = validation_table, validation_view
 
 
 def load(specs: Sequence[ValidationSpec], folder: Path) -> Recordings:

@@ -12,7 +12,7 @@ import numpy as np
 
 from yawbench.figures.style import digits_of, shown_unit
 from yawbench.foundation.messages import counted, in_text
-from yawbench.reports.page_parts import PAGE, RANKING, render
+from yawbench.reports.page_parts import PAGE, RANKING, Page, render
 from yawbench.studies.confidence import Bounds
 from yawbench.studies.tables import Table
 
@@ -409,6 +409,50 @@ def _of_lane_changes(threats: LoadedThreats, setting: str) -> bool:
     return all(threats.spec.threats[name].test == LANE_CHANGE for name in threats.threats_in(setting))
 
 
+@dataclass(frozen=True, kw_only=True)
+class ThreatsPage(Page):
+    """The page of a threat file.
+
+    Attributes:
+        answer: the result in sentences.
+        source, notes: of the file.
+        matrix: address of the ranking's page; "": there is none.
+        quick: whether it is a quick look.
+        published: on entries with published levels.
+        main: scores of the main setting.
+        overview: all disciplines beside each other.
+        levels: highest levels survived; `cars`: of every threat by car.
+        orders, places: without each threat and car.
+        gains, sentence: of gains and laws; empty without them.
+        moves, settings: what other settings change, and their scores.
+        disciplines: a table each.
+        described: range and source of every threat.
+        command, folder: that repeats it; of its results.
+    """
+
+    template = "threats.html.j2"
+    answer: str
+    source: str
+    notes: Sequence[str]
+    matrix: str
+    quick: bool
+    published: str
+    main: Table
+    overview: Table
+    levels: Table
+    cars: Sequence[Table]
+    orders: Table
+    places: Table
+    gains: Sequence[Table]
+    sentence: str
+    moves: Table
+    settings: Sequence[Table]
+    disciplines: Sequence[Table]
+    described: Table
+    command: str
+    folder: Path
+
+
 def threats_page(result: ThreatResult, table: ScoreTable, folder: Path, command: str) -> str:
     """Return the page as HTML.
 
@@ -424,8 +468,7 @@ def threats_page(result: ThreatResult, table: ScoreTable, folder: Path, command:
     gains = compared_gains(result)
     others = compared_settings(result)
     matrix = folder.parent / RANKING.parent.name / PAGE
-    page: str = render(
-        "threats.html.j2",
+    view = ThreatsPage(
         title=threats.spec.title,
         source=threats.spec.source,
         notes=[*threats.spec.notes, *threats.ranking.edited],
@@ -446,6 +489,6 @@ def threats_page(result: ThreatResult, table: ScoreTable, folder: Path, command:
         cars=car_tables(result, order),
         described=threats_table(result),
         command=command,
-        folder=str(folder),
+        folder=folder,
     )
-    return page
+    return render(view)

@@ -293,11 +293,36 @@ OF_CONTROL = ("effort", "total_variation_rate")
 """Measures of control activity: a controller that does nothing has small values, too."""
 
 
-def comparison_facts(findings: ExperimentResult) -> dict[str, Any] | None:
-    """Return the template data of a page that compares runs with the first one; None if none has results.
+@dataclass(frozen=True)
+class PartingView:
+    """How a run differs from the first: a sentence, the first signals to differ, the rest, notes."""
 
-    `views`: of its viewer, with the signals that differ most.
+    title: str
+    summary: str
+    table: Table
+    rest: Table
+    notes: Sequence[str]
+
+
+@dataclass(frozen=True)
+class ComparisonView:
+    """What a page shows that compares runs with the first one.
+
+    Attributes:
+        table: metrics of all runs.
+        views: of its viewer, with the signals that differ most.
+        partings: a run each.
+        rule: from when on a difference counts.
     """
+
+    table: Table
+    views: Sequence[View]
+    partings: Sequence[PartingView]
+    rule: str = RULE
+
+
+def comparison_view(findings: ExperimentResult) -> ComparisonView | None:
+    """Return what a page shows that compares runs with the first one; None if none has results."""
     runs = [
         LabelledRun(run.label, findings.results[name])
         for name, run in findings.experiment.runs.items()
@@ -306,16 +331,18 @@ def comparison_facts(findings: ExperimentResult) -> dict[str, Any] | None:
     if not runs:
         return None
     first, *others = runs
-    divergences = [divergence(first.results, other.results) for other in others]
-    return {
-        "table": metric_table(findings, runs),
-        "views": _most_different(divergences),
-        "partings": [
-            _parted(run.label, first.label, difference)
-            for run, difference in zip(others, divergences, strict=True)
-        ],
-        "rule": RULE,
-    }
+    comparisons = [divergence(first.results, other.results) for other in others]
+    partings = [
+        PartingView(
+            f"{run.label} against {first.label}",
+            parting_summary(comparison),
+            partings_table(comparison.partings[:AT_ONCE]),
+            partings_table(comparison.partings[AT_ONCE:]),
+            comparison.notes,
+        )
+        for run, comparison in zip(others, comparisons, strict=True)
+    ]
+    return ComparisonView(metric_table(findings, runs), _most_different(comparisons), partings)
 
 
 BEST = "★"
@@ -404,16 +431,6 @@ def difference(first: MetricValue | None, other: MetricValue | None) -> str:
         return "the same"
     size = digits_of(abs(apart) * factor)
     return f"{'+' if apart > 0 else '−'}{size} {'points' if unit == '%' else unit}".rstrip()
-
-
-def _parted(label: str, first: str, comparison: RunComparison) -> dict[str, Any]:
-    return {
-        "title": f"{label} against {first}",
-        "summary": parting_summary(comparison),
-        "table": partings_table(comparison.partings[:AT_ONCE]),
-        "rest": partings_table(comparison.partings[AT_ONCE:]),
-        "notes": comparison.notes,
-    }
 
 
 def parting_summary(comparison: RunComparison) -> str:

@@ -8,9 +8,12 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from datetime import datetime, timezone
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar, NamedTuple
+
+from markupsafe import Markup
 
 from yawbench.figures.panels import signals_of
 from yawbench.figures.style import LabelledRun
@@ -54,9 +57,11 @@ from yawbench.studies.result_tables import (
 from yawbench.studies.schema import FigureSpec
 from yawbench.studies.tables import Cell, Table
 
+from .comparison import ComparisonView
 from .diagram import diagram, systems_of
-from .page_parts import FigureImage, anchor, count_kinds, fmus_of, groups_of, image_of, programs_of, render
-from .sweep_view import sweep_sentence, sweep_view, write_sides
+from .page_parts import Document, FigureImage, Page, anchor, image_of, render
+from .provenance import ParameterGroup, count_kinds, fmus_of, groups_of, programs_of
+from .sweep_view import SWEEP_ASSETS, sweep_sentence, sweep_view, write_sides
 from .viewer import (
     DATA,
     LARGEST,
@@ -74,17 +79,151 @@ from .viewer import (
 )
 
 
+@dataclass(frozen=True)
+class JudgedClaim:
+    """A claim or check with its measured values, verdict and margin.
+
+    Attributes:
+        says, source, note: of the file.
+        measured: the values.
+        conditions: of which all must be met.
+        verdict, margin: in words.
+        region: how robust the verdict is, a line each.
+        agreeing: share [%] of the region's points with the same verdict; None: not judged over a region.
+        robust: whether less than a tenth of the region flips the verdict.
+        lines: values along the lines of the region.
+        link: state of the viewer that shows the claim's runs; "" if it has none of them.
+    """
+
+    says: str
+    source: str
+    note: str
+    measured: Sequence[str]
+    conditions: Sequence[str]
+    verdict: str
+    margin: str | None
+    region: Sequence[str]
+    agreeing: float | None
+    robust: bool
+    lines: Table | None
+    link: str
+
+
+class SystemDrawing(NamedTuple):
+    """The diagram of a set of instances, and the scenarios that it applies to."""
+
+    drawing: Markup
+    runs: str
+
+
+class FigureFile(NamedTuple):
+    """Title and path, without suffix, of a figure."""
+
+    title: str
+    file: str
+
+
+class MetricDefinition(NamedTuple):
+    """Heading of a metric, its definition in words, and as a formula."""
+
+    heading: str
+    definition: str
+    formula: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class StudyPage(Page):
+    """The page of an experiment.
+
+    Attributes:
+        id: anchor on the overview, key of its side file there.
+        source: of the experiment.
+        changed: overrides from the command line.
+        counts: verdict of claims -> how many.
+        reach: where claims were judged.
+        answer: the result in sentences.
+        claims, checks: as judged.
+        region: the open values and their ranges; None: not judged over a region.
+        limits: their tables.
+        systems: a diagram for each set of instances.
+        content: of the viewer; None: there are no runs to show.
+        sweep: the view of runs along axes.
+        figures: shown in another form, and beside the page as files.
+        charts: drawn figures, as images.
+        tables: numbers of runs; further ones are folded after `long` rows.
+        definitions: of the metrics.
+        groups, kinds: parameters, and how many have each kind of source.
+        failed: run -> why.
+        stale: run -> why its results are not those of its plan.
+        remarkable: warnings of runs along axes.
+        repeats: what numbers over repeats mean.
+        quick: what a quick look leaves out.
+        command, folder: that repeats it; of its results.
+        settings: overrides of every run.
+        grid: algorithms, step sizes and stop times, with how many runs.
+        runs, not_made: number of all runs, and of those that were not made yet.
+        comparison: metrics side by side, and where the runs part.
+        results: further tables.
+        validations: of runs, by measured cars.
+        fmus, programs: that made the runs.
+    """
+
+    template = "study.html.j2"
+    long: ClassVar[int] = 16
+    """Chosen: with the claims, a page stays below 2,000 elements."""
+    id: str
+    source: str
+    changed: str
+    counts: Mapping[str, int]
+    reach: str
+    answer: str
+    claims: Sequence[JudgedClaim]
+    checks: Sequence[JudgedClaim]
+    region: Table | None
+    limits: Sequence[Table]
+    systems: Sequence[SystemDrawing]
+    content: Carried | None
+    sweep: Markup | None
+    figures: Sequence[FigureFile]
+    charts: Sequence[FigureImage]
+    tables: Sequence[Table]
+    definitions: Sequence[MetricDefinition]
+    groups: Sequence[ParameterGroup]
+    kinds: Mapping[str, int]
+    failed: Mapping[str, str]
+    stale: Mapping[str, str]
+    remarkable: str
+    repeats: str
+    quick: str
+    command: str
+    folder: Path
+    settings: Table
+    grid: Sequence[str]
+    runs: int
+    not_made: int
+    validations: Sequence[Document]
+    fmus: Table
+    programs: Mapping[str, str]
+    comparison: ComparisonView | None = None
+    results: Sequence[Table] = ()
+
+    @property
+    def viewer(self) -> Markup | None:
+        """The viewer of its runs."""
+        return embedded(self.content, VIEW) if self.content else None
+
+
 def chapter(
     findings: ExperimentResult,
     *,
     command: str,
-    stale: dict[str, str],
+    stale: Mapping[str, str],
     folder: Path,
     views: Sequence[View] = (),
     measured: Sequence[LabelledRun] = (),
     each: Each = map,
-) -> dict[str, Any]:
-    """Return the template data of an experiment's page; write the side files of its runs along axes.
+) -> StudyPage:
+    """Return what the page of an experiment shows; write the side files of its runs along axes.
 
     Args:
         findings: the experiment and its results.
@@ -96,61 +235,55 @@ def chapter(
         each: `map`, or a parallel equivalent, to write side files with.
     """
     experiment, spec = findings.experiment, findings.spec
-    name = anchor(f"{experiment.path.absolute().parent.name} {experiment.path.stem}")
     plans = plans_of(findings)
     groups = groups_of([(record_of(job, plan), plan) for job, (_, plan) in plans])
     runs = runs_made(findings)
     kinds = [kind for kind, _ in runs]
-    failed = findings.failed
     content, numbers = viewer_of(findings, views, measured)
     sweep = None
     if spec.axes and findings.planned and len(findings.records) > 1:
         sweep = sweep_view(findings, "sweep", write_sides(findings, folder, each))
-
-    def with_link(results: Sequence[ClaimResult]) -> list[dict[str, Any]]:
-        return [judged(result) | {"link": link_to_runs(experiment, result, numbers)} for result in results]
-
-    return {
-        "id": name,
-        "title": spec.title,
-        "source": spec.source,
-        "changed": changed(experiment.by_options),
-        "counts": counts_of(findings.claims),
-        "reach": reach(findings),
-        "answer": " ".join(filter(None, (answer(findings), sweep and sweep_sentence(findings)))),
-        "claims": with_link(findings.claims),
-        "checks": with_link(findings.checks),
-        "region": region_table(findings) if findings.regions else None,
-        "limits": limit_tables(findings),
-        "systems": systems(plans, spec.title),
-        "content": content,
-        "sweep": sweep,
-        "figures": figure_files(findings),
-        "charts": charts(findings, folder / FIGURES),
-        "tables": [*run_tables(findings), *derived_tables(findings, apart=True)],
-        "definitions": definitions(findings),
-        "groups": groups,
-        "kinds": count_kinds(groups),
-        "failed": failed,
-        "stale": stale,
-        "remarkable": findings.remarkable() if spec.axes else "",
-        "repeats": repeats(findings),
-        "quick": experiment.quick,
-        "command": command,
-        "folder": str(folder),
-        "settings": settings(findings),
-        "grid": grid_of_times(runs),
-        "runs": len(findings.records),
-        "not_made": findings.not_made,
-        "comparison": None,
-        "results": [],
-        "validations": [
-            validating().facts(validation, f"validation-{number}")
-            for number, validation in enumerate(findings.validations, start=1)
-        ],
-        "fmus": fmus_of(kinds),
-        "programs": programs_of(kinds),
-    }
+    validations = [
+        validating().view(validation, f"validation-{number}")
+        for number, validation in enumerate(findings.validations, start=1)
+    ]
+    return StudyPage(
+        id=anchor(f"{experiment.path.absolute().parent.name} {experiment.path.stem}"),
+        title=spec.title,
+        assets=assets(*SWEEP_ASSETS if sweep else ()) if content or sweep or validations else None,
+        source=spec.source,
+        changed=changed(experiment.by_options),
+        counts=counts_of(findings.claims),
+        reach=reach(findings),
+        answer=" ".join(filter(None, (answer(findings), sweep and sweep_sentence(findings)))),
+        claims=[judged(result, link_to_runs(experiment, result, numbers)) for result in findings.claims],
+        checks=[judged(result, link_to_runs(experiment, result, numbers)) for result in findings.checks],
+        region=region_table(findings) if findings.regions else None,
+        limits=limit_tables(findings),
+        systems=systems(plans, spec.title),
+        content=content,
+        sweep=sweep,
+        figures=figure_files(findings),
+        charts=charts(findings, folder / FIGURES),
+        tables=[*run_tables(findings), *derived_tables(findings, apart=True)],
+        definitions=definitions(findings),
+        groups=groups,
+        kinds=count_kinds(groups),
+        failed=findings.failed,
+        stale=stale,
+        remarkable=findings.remarkable() if spec.axes else "",
+        repeats=repeats(findings),
+        quick=experiment.quick,
+        command=command,
+        folder=folder,
+        settings=settings(findings),
+        grid=grid_of_times(runs),
+        runs=len(findings.records),
+        not_made=findings.not_made,
+        validations=validations,
+        fmus=fmus_of(kinds),
+        programs=programs_of(kinds),
+    )
 
 
 def link_to_runs(experiment: LoadedExperiment, result: ClaimResult, numbers: Mapping[str, int]) -> str:
@@ -233,29 +366,30 @@ def in_sentence(counts: Mapping[str, int]) -> str:
     return listed(parts, last="and")
 
 
-def judged(result: ClaimResult) -> dict[str, Any]:
-    """Return a claim with its measured values and verdict."""
-    return {
-        "says": result.claim.says,
-        "source": result.claim.source,
-        "measured": result.measured,
-        "conditions": [str(condition) for condition in result.claim.holds_if],
-        "verdict": verdict(result),
-        "margin": margin_words(result.verdict),
-        "region": region_words(result),
-        "agreeing": result.region and 100 * result.region.agreeing,
-        "robust": result.region is not None and result.region.robust,
-        "lines": line_table(result) if result.region else None,
-        "note": result.claim.note,
-    }
+def judged(result: ClaimResult, link: str) -> JudgedClaim:
+    """Return a claim as the page shows it."""
+    return JudgedClaim(
+        says=result.claim.says,
+        source=result.claim.source,
+        note=result.claim.note,
+        measured=result.measured,
+        conditions=[str(condition) for condition in result.claim.holds_if],
+        verdict=verdict(result),
+        margin=margin_words(result.verdict),
+        region=region_words(result),
+        agreeing=100 * result.region.agreeing if result.region else None,
+        robust=result.region is not None and result.region.robust,
+        lines=line_table(result) if result.region else None,
+        link=link,
+    )
 
 
-def systems(plans: Sequence[tuple[Job, tuple[LoadedScenario, Plan]]], title: str) -> list[dict[str, Any]]:
+def systems(plans: Sequence[tuple[Job, tuple[LoadedScenario, Plan]]], title: str) -> list[SystemDrawing]:
     """Return a diagram for each set of instances, with the scenarios that it applies to."""
     drawn = []
     for system, numbers in systems_of([plan for _, (_, plan) in plans]):
         files = dict.fromkeys(plans[k][0].scenario.name for k in numbers)
-        drawn.append({"drawing": diagram(system, title), "runs": ", ".join(files)})
+        drawn.append(SystemDrawing(diagram(system, title), ", ".join(files)))
     return drawn
 
 
@@ -267,8 +401,6 @@ SEVERAL = {
     **{word: word.replace("does", "do", 1) for word in FAILS.values()},
 }
 """Verdict -> its plural."""
-LONG = 16
-"""Rows of tables; further tables are folded. Chosen: with the claims, a page stays below 2,000 elements."""
 VIEW = "view"
 """Anchor of the viewer."""
 
@@ -331,10 +463,10 @@ def _liveliest(runs: Sequence[LabelledRun]) -> float:
     return 0.0
 
 
-def figure_files(findings: ExperimentResult) -> list[dict[str, str]]:
+def figure_files(findings: ExperimentResult) -> list[FigureFile]:
     """Return title and path, without suffix, of the figures that the page shows in another form."""
     return [
-        {"title": title_of(findings, spec), "file": f"{FIGURES}/{spec.name}"}
+        FigureFile(title_of(findings, spec), f"{FIGURES}/{spec.name}")
         for spec in findings.spec.figures
         if spec.what.over_axes or (spec.what.shows == "runs" and runs_of(findings, spec))
     ]
@@ -350,15 +482,11 @@ def charts(findings: ExperimentResult, folder: Path) -> list[FigureImage]:
     return drawn
 
 
-def definitions(findings: ExperimentResult) -> list[dict[str, str]]:
+def definitions(findings: ExperimentResult) -> list[MetricDefinition]:
     """Return the definition of every metric of the study."""
     every = [(spec, metric(spec.metric)) for spec in findings.spec.metrics.values()]
     return [
-        {
-            "heading": heading(spec),
-            "definition": f"{chosen.definition}{spec.during('from ')}",
-            "formula": chosen.formula,
-        }
+        MetricDefinition(heading(spec), f"{chosen.definition}{spec.during('from ')}", chosen.formula)
         for spec, chosen in every
     ]
 
@@ -394,31 +522,41 @@ def grid_of_times(runs: Iterable[tuple[Results | Plan, int]]) -> list[str]:
     return [f"{text} ({counted(count, 'run')})" for text, count in counts.items()]
 
 
-def study_page(facts: dict[str, Any]) -> str:
-    """Return the page of an experiment."""
-    content, scripts = facts["content"], ["sweep.js"] if facts["sweep"] else []
-    return render(
-        "study.html.j2",
-        facts,
-        viewer=embedded(content, VIEW) if content else None,
-        long=LONG,
-        assets=assets(*scripts) if content or scripts or facts["validations"] else "",
-    )
-
-
 OVERVIEW = "Yaw-stability control: what papers say, and what comes out"
 """Title of the overview."""
 
 
-def _answer_of_all(chapters: Sequence[dict[str, Any]]) -> str:
+@dataclass(frozen=True, kw_only=True)
+class OverviewPage(Page):
+    """The page on several experiments.
+
+    Attributes:
+        chapters: the experiments, each with the address of its page.
+        answer: how many claims hold, in a sentence.
+        ranking: address of the ranking's page; "": there is none.
+        folder: of the side files.
+        first: key of the side file that is shown first.
+        frame: the viewer for their runs.
+    """
+
+    template = "overview.html.j2"
+    chapters: Sequence[tuple[StudyPage, str]]
+    answer: str
+    ranking: str
+    folder: str
+    first: str
+    frame: Markup
+
+
+def _answer_of_all(chapters: Sequence[StudyPage]) -> str:
     """Return in a sentence how many claims of all studies hold; "" without claims."""
     counts: Counter[str] = Counter()
-    for facts in chapters:
-        counts.update(facts["counts"])
+    for study in chapters:
+        counts.update(study.counts)
     if not counts:
         return ""
-    with_claims = [facts for facts in chapters if facts["counts"]]
-    alone = sum(not facts["region"] for facts in with_claims)
+    with_claims = [study for study in chapters if study.counts]
+    alone = sum(not study.region for study in with_claims)
     where = f", {'all' if alone == len(with_claims) else f'{alone} of the studies'} at the chosen point only"
     return (
         f"Of {sum(counts.values())} claims in {counted(len(with_claims), 'study', 'studies')}, "
@@ -427,22 +565,23 @@ def _answer_of_all(chapters: Sequence[dict[str, Any]]) -> str:
 
 
 def overview_page(
-    chapters: Sequence[dict[str, Any]], pages: Sequence[str], folder: Path, ranking: str = ""
+    chapters: Sequence[StudyPage], pages: Sequence[str], folder: Path, ranking: str = ""
 ) -> str:
     """Return the page on several experiments; write side files with their runs.
 
     Args:
-        chapters: of the experiments.
+        chapters: the experiments.
         pages: their addresses.
         folder: of the overview.
         ranking: address of the ranking's page; "": there is none.
     """
-    shown = {facts["id"]: facts["content"] for facts in chapters if facts["content"]}
+    shown = {study.id: study.content for study in chapters if study.content}
     for key, content in shown.items():
         write_side(folder, key, content)
     tidy_sides(folder, shown.keys())
-    return render(
-        "overview.html.j2", title=OVERVIEW, chapters=[*zip(chapters, pages, strict=True)], ranking=ranking,
+    view = OverviewPage(
+        title=OVERVIEW, chapters=[*zip(chapters, pages, strict=True)], ranking=ranking,
         answer=_answer_of_all(chapters), folder=DATA, first=next(iter(shown), ""), frame=embedded(None, VIEW),
         assets=assets("chooser.js"),
     )  # fmt: skip
+    return render(view)

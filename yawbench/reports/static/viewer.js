@@ -678,7 +678,7 @@ let bytesOf = (block) => inflate(block.textContent); // a served page has its ow
 
 async function startViewer(root) {
   root.classList.add('yv-started');
-  const data = JSON.parse(root.querySelector('script[type="application/json"]').textContent);
+  const data = JSON.parse(await unpacked(root.querySelector('script[type="application/json"]')));
   return fillViewer(root, data, [...root.querySelectorAll('script[type="text/plain"]')].map((block) => bytesOf(block)));
 }
 

@@ -15,14 +15,6 @@ function made(tag, content = '', properties = {}) {
 
 const WHEELS = ['fl', 'fr', 'rl', 'rr'];
 
-async function inflate(text) {
-  const raw = atob(text);
-  const bytes = new Uint8Array(raw.length);
-  for (let i = 0; i < raw.length; i++) bytes[i] = raw.charCodeAt(i);
-  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream('gzip'));
-  return new Uint8Array(await new Response(stream).arrayBuffer());
-}
-
 const NOT_FINITE = [NaN, -Infinity, Infinity];
 
 function decoded([offset, base, step], rows, bytes) {
