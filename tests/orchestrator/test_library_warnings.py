@@ -18,7 +18,7 @@ from yawbench.figures.style import digits_of, save
 from yawbench.foundation.errors import RecordWarning
 from yawbench.metrics.expressions import STANDARD, evaluate_all
 from yawbench.metrics.measures import catalogue
-from yawbench.reports.comparison import divergence
+from yawbench.reports.divergence import divergence
 from yawbench.reports.viewer import page
 
 from .recorded import write

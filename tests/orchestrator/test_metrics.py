@@ -29,7 +29,7 @@ from yawbench.metrics.verdict import compare
 from yawbench.orchestrator.results.reader import Results
 from yawbench.orchestrator.results.run_record import ConnectionRecord, FmuRecord, RunRecord
 from yawbench.proving_ground.standard_tests import Evaluation
-from yawbench.reports.comparison import divergence, partings_table
+from yawbench.reports.divergence import divergence, partings_table
 from yawbench.studies.result_tables import run_table
 from yawbench.studies.tables import metrics_of_run
 from yawbench.vocabulary.wheels import WHEELS

@@ -199,8 +199,8 @@ def write_overview(chapters: Sequence[StudyPage], pages: Sequence[Path], folder:
     import os
 
     from yawbench.foundation.safe_files import write_whole
+    from yawbench.reports.overview_page import overview_page
     from yawbench.reports.page_parts import PAGE, RANKING
-    from yawbench.reports.study_page import overview_page
 
     def address(page: Path) -> str:
         return Path(os.path.relpath(page, folder)).as_posix()

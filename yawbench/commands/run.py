@@ -335,7 +335,8 @@ def diff(first_run: FirstRun, second_run: SecondRun, begin: MeasuredFrom = "0 s"
     largest value), and the largest difference. The filter of a measurement acts on the other run, too, which
     is interpolated to the times of the measurement. Exit status 1 if nothing could be compared.
     """
-    from yawbench.reports.comparison import differences, differences_table, divergence, outcome_table
+    from yawbench.reports.divergence import divergence, outcome_table
+    from yawbench.reports.record_differences import differences, differences_table
 
     from .results import distinct, read_runs, start_of
 

@@ -1,7 +1,6 @@
-"""The page of an experiment, a single HTML file, and the overview of several, with a link to each page.
+"""The page of an experiment, a single HTML file.
 
-A page has the verdicts, runs, system, tables and parameters of the experiment, and how to repeat it; the
-overview has the verdicts of all. A click on a claim there loads its runs from a side file.
+It has the verdicts, runs, system, tables and parameters of the experiment, and how to repeat it.
 """
 
 from __future__ import annotations
@@ -59,11 +58,10 @@ from yawbench.studies.tables import Cell, Table
 
 from .comparison import ComparisonView
 from .diagram import diagram, systems_of
-from .page_parts import Document, FigureImage, Page, anchor, image_of, render
+from .page_parts import Document, FigureImage, Page, anchor, image_of
 from .provenance import ParameterGroup, count_kinds, fmus_of, groups_of, programs_of
 from .sweep_view import SWEEP_ASSETS, sweep_sentence, sweep_view, write_sides
 from .viewer import (
-    DATA,
     LARGEST,
     MOST,
     PANELS,
@@ -74,8 +72,6 @@ from .viewer import (
     assets,
     carried,
     embedded,
-    tidy_sides,
-    write_side,
 )
 
 
@@ -520,68 +516,3 @@ def grid_of_times(runs: Iterable[tuple[Results | Plan, int]]) -> list[str]:
             algorithm, step, end = run.record.algorithm, run.record.step_size, run.record.stop_time
         counts[f"{algorithm}, {1000 * step:g} ms, until {end:g} s"] += number
     return [f"{text} ({counted(count, 'run')})" for text, count in counts.items()]
-
-
-OVERVIEW = "Yaw-stability control: what papers say, and what comes out"
-"""Title of the overview."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class OverviewPage(Page):
-    """The page on several experiments.
-
-    Attributes:
-        chapters: the experiments, each with the address of its page.
-        answer: how many claims hold, in a sentence.
-        ranking: address of the ranking's page; "": there is none.
-        folder: of the side files.
-        first: key of the side file that is shown first.
-        frame: the viewer for their runs.
-    """
-
-    template = "overview.html.j2"
-    chapters: Sequence[tuple[StudyPage, str]]
-    answer: str
-    ranking: str
-    folder: str
-    first: str
-    frame: Markup
-
-
-def _answer_of_all(chapters: Sequence[StudyPage]) -> str:
-    """Return in a sentence how many claims of all studies hold; "" without claims."""
-    counts: Counter[str] = Counter()
-    for study in chapters:
-        counts.update(study.counts)
-    if not counts:
-        return ""
-    with_claims = [study for study in chapters if study.counts]
-    alone = sum(not study.region for study in with_claims)
-    where = f", {'all' if alone == len(with_claims) else f'{alone} of the studies'} at the chosen point only"
-    return (
-        f"Of {sum(counts.values())} claims in {counted(len(with_claims), 'study', 'studies')}, "
-        f"{in_sentence(counts)}{where if alone else ''}."
-    )
-
-
-def overview_page(
-    chapters: Sequence[StudyPage], pages: Sequence[str], folder: Path, ranking: str = ""
-) -> str:
-    """Return the page on several experiments; write side files with their runs.
-
-    Args:
-        chapters: the experiments.
-        pages: their addresses.
-        folder: of the overview.
-        ranking: address of the ranking's page; "": there is none.
-    """
-    shown = {study.id: study.content for study in chapters if study.content}
-    for key, content in shown.items():
-        write_side(folder, key, content)
-    tidy_sides(folder, shown.keys())
-    view = OverviewPage(
-        title=OVERVIEW, chapters=[*zip(chapters, pages, strict=True)], ranking=ranking,
-        answer=_answer_of_all(chapters), folder=DATA, first=next(iter(shown), ""), frame=embedded(None, VIEW),
-        assets=assets("chooser.js"),
-    )  # fmt: skip
-    return render(view)
