@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 
-from yawbench.figures.style import LabelledRun
+from yawbench.figures.display import LabelledRun
 from yawbench.foundation.errors import ResultsError
 from yawbench.foundation.messages import counted, listed
 from yawbench.foundation.safe_files import reason, write_whole

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from tests.refusals import mentions, refused
+from yawbench.figures.display import digits_of, shown, shown_unit
 from yawbench.figures.plots import LabelledRun, draw, shown_by
-from yawbench.figures.style import digits_of, shown, shown_unit
 from yawbench.foundation.errors import ScenarioError
 from yawbench.metrics import measures
 from yawbench.metrics.expressions import (

@@ -10,7 +10,7 @@ from lxml import html
 from tests.refusals import each_mentions, mentions, texts_of
 from yawbench.commands.experiments import chapter_of
 from yawbench.components.sensing.noise import key, normal
-from yawbench.figures.style import shown
+from yawbench.figures.display import shown
 from yawbench.foundation.errors import ScenarioError
 from yawbench.metrics.expressions import MetricValue
 from yawbench.reports.page_parts import render

@@ -13,8 +13,8 @@ import pytest
 
 from tests.changed import changed
 from tests.commands import status_of
+from yawbench.figures.display import LabelledRun
 from yawbench.figures.panels import panels_of
-from yawbench.figures.style import LabelledRun
 from yawbench.metrics.expressions import evaluate, metric
 from yawbench.orchestrator.results.reader import load_results
 from yawbench.orchestrator.scenario.loader import load_scenario

@@ -15,7 +15,7 @@ from lxml import html
 from rich.console import Console
 
 from tests.refusals import each_mentions, mentions, refused, texts_of
-from yawbench.figures.style import shown
+from yawbench.figures.display import shown
 from yawbench.foundation.errors import Diagnostic, ScenarioError
 from yawbench.metrics.expressions import MetricValue
 from yawbench.orchestrator.plan import Override

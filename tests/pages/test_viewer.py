@@ -15,8 +15,9 @@ from tests.orchestrator.recorded import car, noted, write
 from tests.refusals import each_mentions, mentions
 from yawbench.cli import main
 from yawbench.components.driving.track import LaneChangeParameters, Track
+from yawbench.figures.display import digits_of, shown_unit
 from yawbench.figures.panels import LabelledRun
-from yawbench.figures.style import LINES, digits_of, shown_unit
+from yawbench.figures.style import LINES
 from yawbench.foundation.errors import ResultsError
 from yawbench.orchestrator.results.measurement_results import MeasuredResults
 from yawbench.orchestrator.results.reader import Results

@@ -35,7 +35,7 @@ from mimetypes import guess_type
 from pathlib import Path
 from urllib.parse import parse_qs, quote, unquote_to_bytes, urlsplit
 
-from yawbench.figures.style import LabelledRun
+from yawbench.figures.display import LabelledRun
 from yawbench.foundation.errors import ResultsError, YawbenchError
 from yawbench.foundation.messages import printable
 from yawbench.foundation.safe_files import NO_FOLLOW

@@ -20,7 +20,7 @@ from typing import Any
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass as checked
 
-from yawbench.figures.style import LabelledRun
+from yawbench.figures.display import LabelledRun
 from yawbench.fmus.fmu import Variable, is_path
 from yawbench.fmus.opener import Building, find_folder
 from yawbench.foundation.errors import Interrupted, ScenarioError, YawbenchError

@@ -19,7 +19,7 @@ from .options import CHANGES, MAKING, RunOptions, executor_of, named, pooled, ta
 from .output import hold, print_tables, say, say_failed, stoppable, tabular
 
 if TYPE_CHECKING:
-    from yawbench.figures.style import LabelledRun
+    from yawbench.figures.display import LabelledRun
     from yawbench.reports.study_page import StudyPage
     from yawbench.reports.viewer import View
     from yawbench.studies.dry_run import Forecast, Pace

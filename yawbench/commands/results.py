@@ -279,9 +279,10 @@ def plot(
     """
     import matplotlib
 
+    from yawbench.figures.display import LabelledRun
     from yawbench.figures.panels import check_panels
     from yawbench.figures.plots import OVERVIEW, draw, shown_by, size_of_style
-    from yawbench.figures.style import KINDS, LabelledRun, save
+    from yawbench.figures.style import KINDS, save
     from yawbench.studies.scenario_experiments import FIGURES
 
     settings = _settings(style, size)
@@ -358,7 +359,7 @@ def write_view(
     Raises:
         ResultsError: a run cannot be read, or the page cannot be written.
     """
-    from yawbench.figures.style import LabelledRun
+    from yawbench.figures.display import LabelledRun
     from yawbench.foundation.safe_files import write_whole
     from yawbench.reports.viewer import SETTINGS, Settings, View, page
 

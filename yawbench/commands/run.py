@@ -21,7 +21,7 @@ from .output import hold, print_tables, say, shows_bars, tabular
 from .results import MeasuredFrom, MeasuredRuns, distinct, start_of, with_segments
 
 if TYPE_CHECKING:
-    from yawbench.figures.style import LabelledRun
+    from yawbench.figures.display import LabelledRun
 
 
 MetricsOption = Annotated[
@@ -221,7 +221,7 @@ def compare(
 
 def labelled_recordings(measured: Sequence[Path] | None, begin: str) -> list[LabelledRun]:
     """Return the segments of measurement files, as runs that begin at a time of theirs."""
-    from yawbench.figures.style import LabelledRun
+    from yawbench.figures.display import LabelledRun
     from yawbench.orchestrator.results.measurement_results import load_run
 
     places, start = with_segments((), measured), start_of(begin)

@@ -133,8 +133,9 @@ def draw_measurement(file: Path, measurement: Measurement, out: Path) -> None:
         ScenarioError: the format is unknown.
         ResultsError: the figure cannot be written.
     """
+    from yawbench.figures.display import LabelledRun
     from yawbench.figures.plots import draw
-    from yawbench.figures.style import KINDS, LabelledRun, save
+    from yawbench.figures.style import KINDS, save
     from yawbench.orchestrator.results.measurement_results import (
         filtered_alike,
         measured_results,

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from yawbench.figures.style import LabelledRun, shown_unit
+from yawbench.figures.display import LabelledRun, shown_unit
 from yawbench.foundation.messages import counted, span
 from yawbench.measured_cars.fit_result import PARTS, FitResult, FittedModel
 from yawbench.measured_cars.least_squares import LEAST_PIECES

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from markupsafe import Markup
 
-from yawbench.figures.style import LabelledRun, shown
+from yawbench.figures.display import LabelledRun, shown
 from yawbench.foundation.messages import listed
 from yawbench.measured_cars.validation import Validation
 from yawbench.metrics.measures import words

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from markupsafe import Markup
 
-from yawbench.figures.style import LabelledRun
+from yawbench.figures.display import LabelledRun
 from yawbench.foundation.errors import ResultsError, ScenarioError
 from yawbench.foundation.messages import counted, in_text, listed
 from yawbench.metrics.verdict import NotJudged

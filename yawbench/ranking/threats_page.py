@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from yawbench.figures.style import digits_of, shown_unit
+from yawbench.figures.display import digits_of, shown_unit
 from yawbench.foundation.messages import counted, in_text
 from yawbench.reports.page_parts import PAGE, RANKING, Page, render
 from yawbench.studies.confidence import Bounds

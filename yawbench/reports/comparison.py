@@ -6,7 +6,7 @@ import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
-from yawbench.figures.style import LabelledRun, digits_of, shown, shown_unit
+from yawbench.figures.display import LabelledRun, digits_of, shown, shown_unit
 from yawbench.metrics.expressions import MetricValue, metric
 from yawbench.metrics.measures import variable_of
 from yawbench.studies.experiment_result import ExperimentResult

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from yawbench.figures.style import shown, unit_of_signal
+from yawbench.figures.display import shown, unit_of_signal
 from yawbench.foundation.messages import counted, resolved, span, star
 from yawbench.metrics.expressions import angles_in, standing_in
 from yawbench.orchestrator.recordings.gaps import gaps_noted, outside

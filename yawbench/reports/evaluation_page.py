@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from yawbench.figures.style import LabelledRun, digits_apart, shown
+from yawbench.figures.display import LabelledRun, digits_apart, shown
 from yawbench.foundation.messages import counted
 from yawbench.metrics.measures import words
 from yawbench.metrics.verdict import SYMBOLS, Status, Verdict, worst

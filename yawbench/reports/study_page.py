@@ -14,8 +14,8 @@ from typing import Any, ClassVar, NamedTuple
 
 from markupsafe import Markup
 
-from yawbench.figures.panels import signals_of
-from yawbench.figures.style import LabelledRun
+from yawbench.figures.display import LabelledRun
+from yawbench.figures.phase_portrait import signals_of
 from yawbench.foundation.errors import ResultsError
 from yawbench.foundation.messages import counted, listed
 from yawbench.metrics.expressions import evaluate, metric

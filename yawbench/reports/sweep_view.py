@@ -17,7 +17,7 @@ from typing import Any
 
 from markupsafe import Markup
 
-from yawbench.figures.style import LabelledRun, digits_of, shown, shown_unit
+from yawbench.figures.display import LabelledRun, digits_of, shown, shown_unit
 from yawbench.foundation.errors import ResultsError
 from yawbench.foundation.messages import counted, listed
 from yawbench.metrics.expressions import metric

@@ -17,17 +17,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from markupsafe import Markup
 
+from yawbench.figures.display import LabelledRun, digits_apart, shown, shown_unit, unit_of_signal
 from yawbench.figures.plots import changes_of, spans_of
-from yawbench.figures.style import (
-    LINES,
-    MEASURED_LINE,
-    LabelledRun,
-    digits_apart,
-    line_style,
-    shown,
-    shown_unit,
-    unit_of_signal,
-)
+from yawbench.figures.style import LINES, MEASURED_LINE, line_style
 from yawbench.foundation.errors import ResultsError
 from yawbench.foundation.messages import listed
 from yawbench.foundation.safe_files import write_whole

@@ -13,7 +13,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 
-from yawbench.figures.style import DIGITS, digits_apart, digits_of, shown
+from yawbench.figures.display import DIGITS, digits_apart, digits_of, shown
 from yawbench.foundation.errors import ScenarioError
 from yawbench.metrics.expressions import MetricValue
 from yawbench.metrics.verdict import Status, Verdict, compare, worst

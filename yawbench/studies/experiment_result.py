@@ -10,7 +10,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeVar
 
-from yawbench.figures.style import digits_of
+from yawbench.figures.display import digits_of
 from yawbench.foundation.errors import Diagnostic, ResultsError
 from yawbench.foundation.messages import counted
 from yawbench.metrics.expressions import MetricValue

@@ -16,8 +16,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from yawbench.figures.display import LabelledRun
 from yawbench.figures.plots import draw
-from yawbench.figures.style import ROW, LabelledRun, frame, literal, new_figure, save
+from yawbench.figures.style import ROW, frame, literal, new_figure, save
 from yawbench.foundation.cache import changed_since, warn_of_record, with_checksums
 from yawbench.foundation.errors import ResultsError
 from yawbench.foundation.messages import counted

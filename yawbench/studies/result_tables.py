@@ -9,7 +9,7 @@ import itertools
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
-from yawbench.figures.style import digits_of, shown
+from yawbench.figures.display import digits_of, shown
 from yawbench.foundation.errors import text_of
 from yawbench.metrics.expressions import MetricValue, metric
 from yawbench.metrics.verdict import Status, Verdict

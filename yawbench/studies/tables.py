@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from yawbench.figures.style import shown
+from yawbench.figures.display import shown
 from yawbench.fmus.archive import open_fmu, runs_as
 from yawbench.fmus.fmu import Fmu
 from yawbench.foundation.errors import Diagnostic, ModelDescriptionError, ResultsError, ScenarioError, text_of

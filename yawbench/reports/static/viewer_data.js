@@ -116,7 +116,7 @@ function extremes(values, from = [Infinity, -Infinity]) {
   return [low, high];
 }
 
-// A number with some significant digits, as `figures/style.digits_of` writes it.
+// A number with some significant digits, as `figures/display.digits_of` writes it.
 function digitsOf(value, digits) {
   if (Number.isNaN(value)) return 'no number';
   if (!Number.isFinite(value)) return value > 0 ? 'never' : '-∞';
