@@ -9,6 +9,7 @@ import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 import numpy as np
 
@@ -78,7 +79,7 @@ def unpacked(page: Path | str) -> str:
 
     def filled(place: re.Match[str]) -> str:
         text = gzip.decompress(base64.b64decode(place["text"])).decode()
-        return f' src="{text}"' if place["image"] else f">{text}"
+        return f' src="data:image/svg+xml,{quote(text)}"' if place["image"] else f">{text}"
 
     return re.sub(r'((?P<image>(?<=<img))|) data-packed="(?P<text>[^"]*)"(?(image)|>)', filled, html)
 

@@ -157,23 +157,15 @@ def shown_first(knobs: Sequence[Knob], plan: Plan) -> list[str]:
 
 @dataclass(frozen=True, kw_only=True)
 class BenchPage(Page):
-    """The page with sliders of a scenario.
-
-    Attributes:
-        others: names of scenarios to choose from.
-        knobs: all values that a slider can change.
-        swaps: instances with the FMUs that can take their place.
-        wires: that a fault can act on.
-        data: for the script.
-    """
+    """The page with sliders of a scenario."""
 
     template = "bench.html.j2"
     scenario: str
-    others: Sequence[str]
-    knobs: Sequence[Knob]
-    swaps: Sequence[tuple[Instance, list[str]]]
-    wires: Sequence[str]
-    data: dict[str, Any]
+    others: Sequence[str]  # names of scenarios to choose from
+    knobs: Sequence[Knob]  # all values that a slider can change
+    swaps: Sequence[tuple[Instance, list[str]]]  # instances with the FMUs that can take their place
+    wires: Sequence[str]  # that a fault can act on
+    data: dict[str, Any]  # for the script
 
 
 @checked(frozen=True, config=ConfigDict(extra="forbid", strict=True))

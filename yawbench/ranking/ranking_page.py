@@ -96,37 +96,27 @@ class RankingPage(Page):
     """The page of a ranking.
 
     Attributes:
-        answer: the result in sentences.
         source, notes, rule: of the ranking.
-        quick: whether it is a quick look.
-        missing: controllers without a place.
         first: headings before those of the conditions.
-        conditions: short and whole title.
-        rows: of the matrix.
-        first_cell: key of the cell that is shown first.
-        data_folder: of the side files.
-        frame: the viewer for a cell's worst run.
-        pareto: figure of stability over intervention; None: nothing to draw.
-        table: all numbers.
         described, entries: conditions, controllers.
         command, folder: that repeats it; of its results.
     """
 
     template = "ranking.html.j2"
-    answer: str
+    answer: str  # the result in sentences
     source: str
     notes: Sequence[str]
     rule: str = RULE
-    quick: bool
-    missing: Sequence[str]
+    quick: bool  # whether it is a quick look
+    missing: Sequence[str]  # controllers without a place
     first: Sequence[str] = ("place", "controller", "passed", "95 %", "runs")
-    conditions: Sequence[tuple[str, str]]
-    rows: Sequence[MatrixRow]
-    first_cell: str
-    data_folder: str = DATA
-    frame: Markup
-    pareto: FigureImage | None
-    table: Table
+    conditions: Sequence[tuple[str, str]]  # short and whole title
+    rows: Sequence[MatrixRow]  # of the matrix
+    first_cell: str  # key of the cell that is shown first
+    data_folder: str = DATA  # of the side files
+    frame: Markup  # the viewer for a cell's worst run
+    pareto: FigureImage | None  # figure of stability over intervention; None: nothing to draw
+    table: Table  # all numbers
     described: Table
     entries: Table
     command: str
@@ -139,23 +129,19 @@ class CellPart(Part):
 
     Attributes:
         title, state, says: of the cell.
-        sums: numbers over its runs.
-        repeats: number of seeds.
-        table: of its runs.
         again, command: that repeat its runs, and the regulation's whole series of them.
-        worst: which is its worst run.
     """
 
     template = "ranking_cell.html.j2"
     title: str
     state: str
     says: str
-    sums: Sequence[tuple[str, str]]
-    repeats: int
-    table: Table
+    sums: Sequence[tuple[str, str]]  # numbers over its runs
+    repeats: int  # number of seeds
+    table: Table  # of its runs
     again: str
     command: str
-    worst: str
+    worst: str  # which is its worst run
 
 
 def ranking_page(ranked: RankingResult, folder: Path, command: str, each: Each = map) -> str:

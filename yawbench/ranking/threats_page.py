@@ -414,32 +414,23 @@ class ThreatsPage(Page):
     """The page of a threat file.
 
     Attributes:
-        answer: the result in sentences.
         source, notes: of the file.
-        matrix: address of the ranking's page; "": there is none.
-        quick: whether it is a quick look.
-        published: on entries with published levels.
-        main: scores of the main setting.
-        overview: all disciplines beside each other.
-        levels: highest levels survived; `cars`: of every threat by car.
         orders, places: without each threat and car.
         gains, sentence: of gains and laws; empty without them.
         moves, settings: what other settings change, and their scores.
-        disciplines: a table each.
-        described: range and source of every threat.
         command, folder: that repeats it; of its results.
     """
 
     template = "threats.html.j2"
-    answer: str
+    answer: str  # the result in sentences
     source: str
     notes: Sequence[str]
-    matrix: str
-    quick: bool
-    published: str
-    main: Table
-    overview: Table
-    levels: Table
+    matrix: str  # address of the ranking's page; "": there is none
+    quick: bool  # whether it is a quick look
+    published: str  # on entries with published levels
+    main: Table  # scores of the main setting
+    overview: Table  # all disciplines beside each other
+    levels: Table  # highest levels survived; `cars`: of every threat by car
     cars: Sequence[Table]
     orders: Table
     places: Table
@@ -447,8 +438,8 @@ class ThreatsPage(Page):
     sentence: str
     moves: Table
     settings: Sequence[Table]
-    disciplines: Sequence[Table]
-    described: Table
+    disciplines: Sequence[Table]  # a table each
+    described: Table  # range and source of every threat
     command: str
     folder: Path
 

@@ -45,19 +45,12 @@ class PartingView:
 
 @dataclass(frozen=True)
 class ComparisonView:
-    """What a page shows that compares runs with the first one.
+    """What a page shows that compares runs with the first one."""
 
-    Attributes:
-        table: metrics of all runs.
-        views: of its viewer, with the signals that differ most.
-        partings: a run each.
-        rule: from when on a difference counts.
-    """
-
-    table: Table
-    views: Sequence[View]
-    partings: Sequence[PartingView]
-    rule: str = RULE
+    table: Table  # metrics of all runs
+    views: Sequence[View]  # of its viewer, with the signals that differ most
+    partings: Sequence[PartingView]  # a run each
+    rule: str = RULE  # from when on a difference counts
 
 
 def comparison_view(findings: ExperimentResult) -> ComparisonView | None:

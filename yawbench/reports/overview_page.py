@@ -30,24 +30,15 @@ OVERVIEW = "Yaw-stability control: what papers say, and what comes out"
 
 @dataclass(frozen=True, kw_only=True)
 class OverviewPage(Page):
-    """The page on several experiments.
-
-    Attributes:
-        chapters: the experiments, each with the address of its page.
-        answer: how many claims hold, in a sentence.
-        ranking: address of the ranking's page; "": there is none.
-        folder: of the side files.
-        first: key of the side file that is shown first.
-        frame: the viewer for their runs.
-    """
+    """The page on several experiments."""
 
     template = "overview.html.j2"
-    chapters: Sequence[tuple[StudyPage, str]]
-    answer: str
-    ranking: str
-    folder: str
-    first: str
-    frame: Markup
+    chapters: Sequence[tuple[StudyPage, str]]  # the experiments, each with the address of its page
+    answer: str  # how many claims hold, in a sentence
+    ranking: str  # address of the ranking's page; "": there is none
+    folder: str  # of the side files
+    first: str  # key of the side file that is shown first
+    frame: Markup  # the viewer for their runs
 
 
 def _answer_of_all(chapters: Sequence[StudyPage]) -> str:

@@ -19,7 +19,6 @@ from importlib.metadata import distribution
 from importlib.resources import files
 from pathlib import Path
 from typing import ClassVar
-from urllib.parse import quote
 
 from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
@@ -31,39 +30,23 @@ from yawbench.orchestrator.results.freshness import versions
 from yawbench.studies.result_tables import FAILS, HOLDS, NOT_JUDGED, SENSITIVE, UNDECIDED
 from yawbench.studies.tables import Table
 
-CURLY = str.maketrans("'\"", "’”")
-"""Typographic quotes for text, so that straight ones occur only in the markup."""
 PAGE = "report.html"
 """File name of the page of a study, a ranking or several studies."""
 RANKING = Path("results/proving_ground/ranking", PAGE)
 """Default path of the ranking's page."""
 
 
-def address_of(svg: str) -> Markup:
-    """Return an SVG image as a short `data:` URL for an attribute in double quotes."""
-    svg = svg[svg.index("<svg") :]
-    svg = re.sub(r"<metadata>.*?</metadata>|<!--.*?-->", "", svg, flags=re.DOTALL)
-    svg = re.sub(r"(?<=>)[^<]+(?=<)", lambda text: text[0].translate(CURLY), svg)
-    svg = svg.replace("'", "").replace('"', "'")
-    svg = re.sub(r" id='[\w.]+_\d+'", "", svg)  # of groups, to which nothing refers
-    svg = re.sub(
-        r"(scale\([^)]*\))|(\.\d)\d+", lambda match: match[1] or match[2], svg
-    )  # a tenth of a point; glyphs keep their aspect ratio
-    svg = re.sub(r"\s*\n\s*", "\n", svg)
-    return Markup("data:image/svg+xml," + quote(svg, safe=" =:/'(),;.-+*!?@$[]{}|^`~"))
-
-
 @dataclass(frozen=True)
 class FigureImage:
-    """A whole figure: its title, and its image as a `data:` URL for an `<img>`."""
+    """A whole figure: its title, and its image as SVG."""
 
     title: str
-    address: Markup
+    svg: str
 
 
 def image_of(file: Path, title: str) -> FigureImage:
     """Return an SVG file as an image."""
-    return FigureImage(title, address_of(file.read_text(encoding="utf-8")))
+    return FigureImage(title, file.read_text(encoding="utf-8"))
 
 
 def option_of(change: Override) -> list[str]:
@@ -119,25 +102,18 @@ class Document(Page):
     """A page around a viewer.
 
     Attributes:
-        sentence: the result.
-        changed: overrides of the scenario that the title names.
-        below: a line on what the data are.
-        warnings: shown below the sentence.
-        first: tables before the viewer.
-        notes: below the viewer.
-        sections: heading, or "", and tables.
         many: tables of a section from which on they are folded. Chosen: more hide what comes after them.
     """
 
     template = "document.html.j2"
     viewer: Markup
-    sentence: str = ""
-    changed: str = ""
-    below: str = ""
-    warnings: Sequence[str] = ()
-    first: Sequence[Table] = ()
-    notes: Sequence[str] = ()
-    sections: Sequence[tuple[str, Sequence[Table]]] = ()
+    sentence: str = ""  # the result
+    changed: str = ""  # overrides of the scenario that the title names
+    below: str = ""  # a line on what the data are
+    warnings: Sequence[str] = ()  # shown below the sentence
+    first: Sequence[Table] = ()  # tables before the viewer
+    notes: Sequence[str] = ()  # below the viewer
+    sections: Sequence[tuple[str, Sequence[Table]]] = ()  # heading, or "", and tables
     many: int = 6
 
 

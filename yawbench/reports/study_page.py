@@ -81,28 +81,22 @@ class JudgedClaim:
 
     Attributes:
         says, source, note: of the file.
-        measured: the values.
-        conditions: of which all must be met.
         verdict, margin: in words.
-        region: how robust the verdict is, a line each.
         agreeing: share [%] of the region's points with the same verdict; None: not judged over a region.
-        robust: whether less than a tenth of the region flips the verdict.
-        lines: values along the lines of the region.
-        link: state of the viewer that shows the claim's runs; "" if it has none of them.
     """
 
     says: str
     source: str
     note: str
-    measured: Sequence[str]
-    conditions: Sequence[str]
+    measured: Sequence[str]  # the values
+    conditions: Sequence[str]  # of which all must be met
     verdict: str
     margin: str | None
-    region: Sequence[str]
+    region: Sequence[str]  # how robust the verdict is, a line each
     agreeing: float | None
-    robust: bool
-    lines: Table | None
-    link: str
+    robust: bool  # whether less than a tenth of the region flips the verdict
+    lines: Table | None  # values along the lines of the region
+    link: str  # state of the viewer that shows the claim's runs; "" if it has none of them
 
 
 class SystemDrawing(NamedTuple):
@@ -112,96 +106,56 @@ class SystemDrawing(NamedTuple):
     runs: str
 
 
-class FigureFile(NamedTuple):
-    """Title and path, without suffix, of a figure."""
-
-    title: str
-    file: str
-
-
-class MetricDefinition(NamedTuple):
-    """Heading of a metric, its definition in words, and as a formula."""
-
-    heading: str
-    definition: str
-    formula: str
-
-
 @dataclass(frozen=True, kw_only=True)
 class StudyPage(Page):
     """The page of an experiment.
 
     Attributes:
-        id: anchor on the overview, key of its side file there.
-        source: of the experiment.
-        changed: overrides from the command line.
-        counts: verdict of claims -> how many.
-        reach: where claims were judged.
-        answer: the result in sentences.
         claims, checks: as judged.
-        region: the open values and their ranges; None: not judged over a region.
-        limits: their tables.
-        systems: a diagram for each set of instances.
-        content: of the viewer; None: there are no runs to show.
-        sweep: the view of runs along axes.
-        figures: shown in another form, and beside the page as files.
-        charts: drawn figures, as images.
-        tables: numbers of runs; further ones are folded after `long` rows.
-        definitions: of the metrics.
         groups, kinds: parameters, and how many have each kind of source.
-        failed: run -> why.
-        stale: run -> why its results are not those of its plan.
-        remarkable: warnings of runs along axes.
-        repeats: what numbers over repeats mean.
-        quick: what a quick look leaves out.
         command, folder: that repeats it; of its results.
-        settings: overrides of every run.
-        grid: algorithms, step sizes and stop times, with how many runs.
         runs, not_made: number of all runs, and of those that were not made yet.
-        comparison: metrics side by side, and where the runs part.
-        results: further tables.
-        validations: of runs, by measured cars.
         fmus, programs: that made the runs.
     """
 
     template = "study.html.j2"
     long: ClassVar[int] = 16
     """Chosen: with the claims, a page stays below 2,000 elements."""
-    id: str
-    source: str
-    changed: str
-    counts: Mapping[str, int]
-    reach: str
-    answer: str
+    id: str  # anchor on the overview, key of its side file there
+    source: str  # of the experiment
+    changed: str  # overrides from the command line
+    counts: Mapping[str, int]  # verdict of claims -> how many
+    reach: str  # where claims were judged
+    answer: str  # the result in sentences
     claims: Sequence[JudgedClaim]
     checks: Sequence[JudgedClaim]
-    region: Table | None
-    limits: Sequence[Table]
-    systems: Sequence[SystemDrawing]
-    content: Carried | None
-    sweep: Markup | None
-    figures: Sequence[FigureFile]
-    charts: Sequence[FigureImage]
-    tables: Sequence[Table]
-    definitions: Sequence[MetricDefinition]
+    region: Table | None  # the open values and their ranges; None: not judged over a region
+    limits: Sequence[Table]  # their tables
+    systems: Sequence[SystemDrawing]  # a diagram for each set of instances
+    content: Carried | None  # of the viewer; None: there are no runs to show
+    sweep: Markup | None  # the view of runs along axes
+    figures: Sequence[tuple[str, str]]  # title and file, without suffix, of those shown in another form
+    charts: Sequence[FigureImage]  # drawn figures, as images
+    tables: Sequence[Table]  # numbers of runs; further ones are folded after `long` rows
+    definitions: Sequence[tuple[str, str, str]]  # heading, definition and formula of the metrics
     groups: Sequence[ParameterGroup]
     kinds: Mapping[str, int]
-    failed: Mapping[str, str]
-    stale: Mapping[str, str]
-    remarkable: str
-    repeats: str
-    quick: str
+    failed: Mapping[str, str]  # run -> why
+    stale: Mapping[str, str]  # run -> why its results are not those of its plan
+    remarkable: str  # warnings of runs along axes
+    repeats: str  # what numbers over repeats mean
+    quick: str  # what a quick look leaves out
     command: str
     folder: Path
-    settings: Table
-    grid: Sequence[str]
+    settings: Table  # overrides of every run
+    grid: Sequence[str]  # algorithms, step sizes and stop times, with how many runs
     runs: int
     not_made: int
-    validations: Sequence[Document]
+    validations: Sequence[Document]  # of runs, by measured cars
     fmus: Table
     programs: Mapping[str, str]
-    comparison: ComparisonView | None = None
-    results: Sequence[Table] = ()
+    comparison: ComparisonView | None = None  # metrics side by side, and where the runs part
+    results: Sequence[Table] = ()  # further tables
 
     @property
     def viewer(self) -> Markup | None:
@@ -459,10 +413,10 @@ def _liveliest(runs: Sequence[LabelledRun]) -> float:
     return 0.0
 
 
-def figure_files(findings: ExperimentResult) -> list[FigureFile]:
+def figure_files(findings: ExperimentResult) -> list[tuple[str, str]]:
     """Return title and path, without suffix, of the figures that the page shows in another form."""
     return [
-        FigureFile(title_of(findings, spec), f"{FIGURES}/{spec.name}")
+        (title_of(findings, spec), f"{FIGURES}/{spec.name}")
         for spec in findings.spec.figures
         if spec.what.over_axes or (spec.what.shows == "runs" and runs_of(findings, spec))
     ]
@@ -478,11 +432,11 @@ def charts(findings: ExperimentResult, folder: Path) -> list[FigureImage]:
     return drawn
 
 
-def definitions(findings: ExperimentResult) -> list[MetricDefinition]:
+def definitions(findings: ExperimentResult) -> list[tuple[str, str, str]]:
     """Return the definition of every metric of the study."""
     every = [(spec, metric(spec.metric)) for spec in findings.spec.metrics.values()]
     return [
-        MetricDefinition(heading(spec), f"{chosen.definition}{spec.during('from ')}", chosen.formula)
+        (heading(spec), f"{chosen.definition}{spec.during('from ')}", chosen.formula)
         for spec, chosen in every
     ]
 

@@ -25,7 +25,7 @@ addEventListener('afterprint', () => { opened.forEach((details) => { details.ope
   const scripts = await Promise.all([...document.querySelectorAll('[data-packed]:not([type])')].map(async (place) => {
     const text = await unpacked(place);
     if (place.tagName === 'SCRIPT') return [place, text];
-    if (place.tagName === 'TEMPLATE') place.innerHTML = text; else place.src = text;
+    if (place.tagName === 'TEMPLATE') place.innerHTML = text; else place.src = `data:image/svg+xml,${encodeURIComponent(text)}`;
     if (place.parentElement.open) unfold(place.parentElement);
     return null;
   }));
