@@ -34,5 +34,6 @@ def _box(alert: re.Match[str]) -> str:
 
 
 def on_page_content(html: str, **_: Any) -> str:
-    """Turn formulas into MathML, which browsers draw without any script."""
+    """Turn formulas into MathML, which browsers draw without any script; let names head narrow columns."""
+    html = re.sub(r"(?<=<th)([^>]*>)([^<]*)", lambda th: th[1] + th[2].replace("_", "_<wbr>"), html)
     return formulas.to_mathml(html)

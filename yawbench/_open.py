@@ -136,8 +136,8 @@ class RecordedRuns:
             ScenarioError: a signal was not recorded.
             ResultsError: no results were kept, or no recorded signal can be drawn.
         """
+        from yawbench.figures.display import LabelledRun
         from yawbench.figures.plots import OVERVIEW, draw
-        from yawbench.figures.style import LabelledRun
 
         from .figures import panels as drawing
 

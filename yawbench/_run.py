@@ -219,8 +219,8 @@ class Run:
             ScenarioError: a signal was not recorded.
             ResultsError: no recorded signal can be drawn.
         """
+        from yawbench.figures.display import LabelledRun
         from yawbench.figures.plots import OVERVIEW, draw
-        from yawbench.figures.style import LabelledRun
 
         from .figures import panels as drawing
 
@@ -255,7 +255,7 @@ class Run:
         return f"<Run {self._full_title!r}: {len(self)} rows of {len(self.results.columns)} variables{noted}>"
 
     def _repr_html_(self) -> str:
-        from yawbench.figures.style import shown
+        from yawbench.figures.display import shown
 
         changed = "".join(
             f"<br>{escape(str(change.target))} = {escape(str(change.plain))}" for change in self.changes

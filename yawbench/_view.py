@@ -7,13 +7,12 @@ from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 
-from yawbench.figures.style import LabelledRun
+from yawbench.figures.display import LabelledRun
 from yawbench.foundation.errors import ResultsError
 from yawbench.foundation.messages import counted, listed
 from yawbench.foundation.safe_files import reason, write_whole
 from yawbench.metrics.expressions import columns_of
 from yawbench.orchestrator.scenario.overrides import changed
-from yawbench.reports.page_parts import packed
 from yawbench.reports.viewer import SETTINGS, Settings, page
 from yawbench.reports.viewer import View as Selection
 
@@ -68,7 +67,7 @@ def view(
         len(names) != 1 or names[0] != labelled[0].results.record.title
     ):  # a single run's own title is followed by its overrides
         title = title or listed(names, last="and")
-    html = packed(page(labelled, settings, title=title))
+    html = page(labelled, settings, title=title)
     return View(names, html, arguments.count(height, "height", least=LEAST, most=MOST))
 
 

@@ -18,7 +18,7 @@ from yawbench.figures.plots import LabelledRun, shown_by
 from yawbench.figures.style import save
 from yawbench.foundation.errors import Diagnostic, ScenarioError
 from yawbench.metrics.expressions import MetricValue
-from yawbench.reports.comparison import BEST, comparison_facts, metric_table
+from yawbench.reports.comparison import BEST, comparison_view, metric_table
 from yawbench.studies import result_figures
 from yawbench.studies.claim_schema import MetricSpec
 from yawbench.studies.comparison import FIGURE_SPECS, comparison_table, variants
@@ -194,8 +194,8 @@ def test_a_run_that_failed_is_named_and_the_others_are_drawn(findings, tmp_path,
 
 
 def test_the_page_marks_the_best_and_tells_differences_from_the_first(findings):
-    facts = comparison_facts(findings)
-    error, speed = facts["table"].text()[:2]
+    compared = comparison_view(findings)
+    error, speed = compared.table.text()[:2]
     assert error[2:] == ["140 %", f"2.00 % {BEST}\n−138 points"]
     assert not any(BEST in cell for cell in speed)  # less speed is not better as such
 
@@ -250,7 +250,7 @@ def test_a_comparison_without_any_result_still_writes_its_tables(findings, tmp_p
     drawn, problems = draw_all(empty, tmp_path / "none")
     write_findings(empty, drawn, tmp_path / "none")
     assert len(problems) == 2
-    assert comparison_facts(empty) is None
+    assert comparison_view(empty) is None
     assert (tmp_path / "none/table.csv").is_file()
 
 

@@ -10,8 +10,8 @@ import pytest
 
 import yawbench as yb
 from tests.commands import status_of
+from yawbench.figures.display import LabelledRun
 from yawbench.figures.plots import spans_of
-from yawbench.figures.style import LabelledRun
 from yawbench.foundation.errors import ScenarioError
 from yawbench.measured_cars.fit import load_fit
 from yawbench.measured_cars.flaws import FlawKind, flaws_of

@@ -20,7 +20,8 @@ from yawbench.orchestrator.scenario import yaml_lines
 from yawbench.orchestrator.scenario.loader import load_scenario
 from yawbench.orchestrator.scenario.overrides import read_changes
 from yawbench.orchestrator.wiring.make_plan import make_plan
-from yawbench.reports.study_page import chapter, study_page
+from yawbench.reports.page_parts import render
+from yawbench.reports.study_page import chapter
 from yawbench.studies.experiment import LoadedExperiment
 from yawbench.studies.experiment_result import judge_results
 from yawbench.studies.expression import Expression
@@ -318,8 +319,8 @@ def test_pages_hold_no_escape_sequences_and_no_html_of_users() -> None:
     table = Table(ESCAPES, [ESCAPES], [[ESCAPES]], [ESCAPES])
     spec = ExperimentSpec.model_validate({"title": ESCAPES, "runs": [{"name": "a", "scenario": "a.yaml"}]})
     findings = judge_results(LoadedExperiment(Path("a.yaml"), spec, {}), Path("none"))
-    facts = chapter(findings, command=ESCAPES, stale={}, folder=Path("none"))
-    text = study_page(facts | {"results": [table]})
+    view = chapter(findings, command=ESCAPES, stale={}, folder=Path("none"))
+    text = render(replace(view, results=[table]))
     assert text.count("&lt;script&gt;") >= 6
     assert not set("\x1b\u202e") & set(text)
     assert "<script>alert" not in text

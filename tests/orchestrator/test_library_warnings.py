@@ -12,12 +12,13 @@ import pytest
 
 from tests.commands import status_of
 from tests.pages.made_up import whole_car
+from yawbench.figures.display import digits_of
 from yawbench.figures.panels import LabelledRun
 from yawbench.figures.plots import draw
-from yawbench.figures.style import digits_of, save
+from yawbench.figures.style import save
 from yawbench.metrics.expressions import STANDARD, evaluate_all
 from yawbench.metrics.measures import catalogue
-from yawbench.reports.comparison import divergence
+from yawbench.reports.divergence import divergence
 from yawbench.reports.viewer import page
 
 from .recorded import write

@@ -13,7 +13,7 @@ from yawbench.orchestrator.results.reader import found_runs, load_results
 from yawbench.orchestrator.results.run_folder import RunStatus
 from yawbench.orchestrator.results.run_record import FmuRecord, RunRecord
 from yawbench.orchestrator.scenario.loader import title_of
-from yawbench.reports.comparison import differences
+from yawbench.reports.record_differences import differences
 from yawbench.studies.listings import runs_table
 
 from .recorded import car, write

@@ -13,8 +13,9 @@ from tests.commands import status_of
 from tests.pages.made_up import unpacked
 from tests.refusals import each_mentions
 from yawbench.commands.results import read_runs
+from yawbench.figures.display import LabelledRun
 from yawbench.figures.plots import draw
-from yawbench.figures.style import MEASURED_LINE, LabelledRun
+from yawbench.figures.style import MEASURED_LINE
 
 TIME = np.arange(10.0, 16.0, 0.01)
 SLOW, FAST = (np.sin(2.0 * np.pi * f * TIME) for f in (0.5, 15.0))

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from tests.refusals import mentions, refused
+from yawbench.figures.display import digits_of, shown, shown_unit
 from yawbench.figures.plots import LabelledRun, draw, shown_by
-from yawbench.figures.style import digits_of, shown, shown_unit
 from yawbench.foundation.errors import ScenarioError
 from yawbench.metrics import measures
 from yawbench.metrics.expressions import (
@@ -29,7 +29,7 @@ from yawbench.metrics.verdict import compare
 from yawbench.orchestrator.results.reader import Results
 from yawbench.orchestrator.results.run_record import ConnectionRecord, FmuRecord, RunRecord
 from yawbench.proving_ground.standard_tests import Evaluation
-from yawbench.reports.comparison import divergence, partings_table
+from yawbench.reports.divergence import divergence, partings_table
 from yawbench.studies.evaluation_tables import run_table
 from yawbench.studies.listings import metrics_of_run
 from yawbench.vocabulary.wheels import WHEELS

@@ -14,8 +14,9 @@ from PIL import Image
 
 from tests.commands import status_of
 from tests.refusals import each_mentions
+from yawbench.figures.display import LabelledRun
 from yawbench.figures.plots import draw
-from yawbench.figures.style import LINES, STYLES, LabelledRun
+from yawbench.figures.style import LINES, STYLES
 
 from .recorded import car, write
 

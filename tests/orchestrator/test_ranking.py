@@ -14,7 +14,7 @@ import pytest
 
 from tests.commands import status_of
 from tests.refusals import mentions
-from yawbench.figures.style import shown
+from yawbench.figures.display import shown
 from yawbench.foundation.errors import Diagnostic
 from yawbench.ranking.ranking import EntrySpec, load_ranking
 from yawbench.ranking.ranking_scores import (

@@ -10,10 +10,10 @@ from lxml import html
 from tests.refusals import each_mentions, mentions, texts_of
 from yawbench.commands.experiments import chapter_of
 from yawbench.components.sensing.noise import key, normal
-from yawbench.figures.style import shown
+from yawbench.figures.display import shown
 from yawbench.foundation.errors import ScenarioError
 from yawbench.metrics.expressions import MetricValue
-from yawbench.reports.study_page import study_page
+from yawbench.reports.page_parts import render
 from yawbench.studies.confidence import interval, share_bounds
 from yawbench.studies.experiment import plan_experiment
 from yawbench.studies.experiment_result import judge_records
@@ -187,7 +187,7 @@ def test_in_haste_there_are_fewer_repeats(load):
 
 def test_a_quick_page_says_so_before_anything_else(load, fmus, tmp_path):
     quick = findings_of(load().short, fmus, tmp_path)
-    tree = html.fromstring(study_page(chapter_of(quick, tmp_path, "yawbench study")))
+    tree = html.fromstring(render(chapter_of(quick, tmp_path, "yawbench study")))
     assert tree.xpath("string(//main/p[1])") == "A quick look: 3 of 4 repeats."
 
 

@@ -13,14 +13,14 @@ import pytest
 
 from tests.changed import changed
 from tests.commands import status_of
+from yawbench.figures.display import LabelledRun
 from yawbench.figures.panels import panels_of
-from yawbench.figures.style import LabelledRun
 from yawbench.metrics.expressions import evaluate, metric
 from yawbench.orchestrator.results.reader import load_results
 from yawbench.orchestrator.scenario.loader import load_scenario
 from yawbench.orchestrator.signal_names import SignalName, Target, match, matching
 from yawbench.orchestrator.wiring.make_plan import make_plan
-from yawbench.reports.comparison import divergence
+from yawbench.reports.divergence import divergence
 from yawbench.studies.experiment import plan_experiment
 from yawbench.studies.load_experiment import load_experiment
 from yawbench.studies.open_value_regions import RegionRuns

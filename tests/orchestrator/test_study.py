@@ -15,11 +15,12 @@ from lxml import html
 from rich.console import Console
 
 from tests.refusals import each_mentions, mentions, refused, texts_of
-from yawbench.figures.style import shown
+from yawbench.figures.display import shown
 from yawbench.foundation.errors import Diagnostic, ScenarioError
 from yawbench.metrics.expressions import MetricValue
 from yawbench.orchestrator.plan import Override
-from yawbench.reports.study_page import chapter, study_page, viewer_of
+from yawbench.reports.page_parts import render
+from yawbench.reports.study_page import chapter, viewer_of
 from yawbench.studies.claim_schema import Claim, GridSpec
 from yawbench.studies.claims import ClaimResult, comparisons, judge
 from yawbench.studies.derived import correlation, rank_correlation
@@ -102,8 +103,8 @@ def problems(study, *changes):
 
 def page(findings, out) -> str:
     """Return what a reader of the experiment's page sees."""
-    facts = chapter(findings, command="yawbench study", stale={}, folder=out)
-    text = study_page(facts)
+    view = chapter(findings, command="yawbench study", stale={}, folder=out)
+    text = render(view)
     return " ".join(" ".join(html.fromstring(text).itertext()).split())
 
 

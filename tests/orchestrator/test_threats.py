@@ -325,7 +325,8 @@ def test_two_runs_from_nothing_give_the_same_tables(tmp_path, capsys, monkeypatc
     """Each with an empty cache and its own number of processes."""
     (tmp_path / "ranking.yaml").write_text(RANKING)
     (tmp_path / "threats.yaml").write_text(SMALL)
-    monkeypatch.setitem(_templates().globals, "now", lambda: "one day")  # the runs may end in two minutes
+    shared = _templates("yawbench.ranking").globals
+    monkeypatch.setitem(shared, "now", lambda: "one day")  # the runs may end in two minutes
     for out, jobs in (("first", 1), ("second", 2)):
         monkeypatch.setenv("YAWBENCH_CACHE", str(tmp_path / f"cache of {out}"))
         status = status_of("rank", tmp_path / "threats.yaml", "--out", tmp_path / out, "--jobs", jobs)

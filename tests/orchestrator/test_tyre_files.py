@@ -23,7 +23,7 @@ from yawbench.orchestrator.scenario.loader import load_scenario
 from yawbench.orchestrator.scenario.overrides import changes_of, read_changes
 from yawbench.orchestrator.signal_names import Target
 from yawbench.orchestrator.wiring.make_plan import make_plan
-from yawbench.reports.page_parts import groups_of
+from yawbench.reports.provenance import groups_of
 from yawbench.studies.experiment import plan_experiment
 from yawbench.studies.load_experiment import load_experiment
 

@@ -9,11 +9,14 @@ import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 import numpy as np
 
 from tests.orchestrator.recorded import car, noted, results
 from yawbench.orchestrator.results.reader import Results
+from yawbench.reports.page_parts import static
+from yawbench.reports.viewer import assets
 from yawbench.vocabulary.wheels import WHEELS
 
 HALF_A_CAR = """
@@ -60,21 +63,25 @@ def without(recorded: Results, *parts: str) -> Results:
     return replace(recorded, columns=kept)
 
 
+def head_of(title: str, *names: str) -> str:
+    """Return the head of a page that a test writes by hand, with what viewers share and further assets."""
+    shared = assets(*names)
+    return (
+        f'<!DOCTYPE html><html lang="en"><meta charset="utf-8"><link rel="icon" href="data:,">'
+        f"<title>{title}</title><style>{shared.style}</style>"
+        f"<script>{static('page.js')}</script><script>{shared.script}</script>"
+    )
+
+
 def unpacked(page: Path | str) -> str:
     """Return a page as a browser has it once its script has filled what was packed."""
     html = page if isinstance(page, str) else page.read_text(encoding="utf-8")
-    block = re.search(r'<script type="text/plain" id="packed">(.*?)</script>', html)
-    if block is None:
-        return html
-    texts = iter(json.loads(gzip.decompress(base64.b64decode(block[1]))))
-    head, rest = html[: block.start()], html[block.end() :]
 
     def filled(place: re.Match[str]) -> str:
-        return f' src="{next(texts)}"' if place["image"] else f">{next(texts)}"
+        text = gzip.decompress(base64.b64decode(place["text"])).decode()
+        return f' src="data:image/svg+xml,{quote(text)}"' if place["image"] else f">{text}"
 
-    head = re.sub(r"(?P<image>(?<=<img) data-packed)| data-packed>", filled, head)
-    assert next(texts, None) is None
-    return head + rest
+    return re.sub(r'((?P<image>(?<=<img))|) data-packed="(?P<text>[^"]*)"(?(image)|>)', filled, html)
 
 
 def data_in(html: str) -> dict[str, Any]:

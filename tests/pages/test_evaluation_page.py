@@ -14,7 +14,6 @@ from yawbench.metrics.verdict import compare, not_judged
 from yawbench.proving_ground.standard_tests import TESTS, Evaluation
 from yawbench.proving_ground.trace import trace_of
 from yawbench.reports.evaluation_page import criteria_table, evaluation_page, results_of
-from yawbench.reports.page_parts import save_page
 
 from .browser import DESK, PHONE, Browser
 from .flaws import check_first_screen, check_whole, looks
@@ -104,6 +103,6 @@ def test_a_test_without_criteria_has_its_quantities(traces):
 def test_the_page_has_no_flaws(chromium: Browser, traces, tmp_path: Path, width: int, colours: str):
     file = tmp_path / "evaluation.html"
     runs = [judged("slow", 0.1, 2.0), judged("fast", 0.42)]
-    save_page(file, evaluation_page(TEST, traces, runs, None))
+    file.write_text(evaluation_page(TEST, traces, runs, None), "utf-8")
     check_whole(chromium, file, width, colours)
     check_first_screen(chromium, file, width, 844)

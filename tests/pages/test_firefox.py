@@ -9,11 +9,10 @@ import numpy as np
 import pytest
 
 from yawbench.figures.panels import LabelledRun
-from yawbench.reports.page_parts import save_page
-from yawbench.reports.viewer import assets, carried, embedded, page, write_side
+from yawbench.reports.viewer import carried, embedded, page, write_side
 
 from .browser import Firefox, start_firefox
-from .made_up import whole_car
+from .made_up import head_of, whole_car
 
 VIEWER = "const viewer = document.querySelector('.yv').viewer;"
 READY = "document.querySelector('.yv-ready')"
@@ -35,7 +34,7 @@ def two(tmp_path_factory) -> Path:
     """The page of two runs."""
     file = tmp_path_factory.mktemp("firefox") / "two.html"
     runs = [LabelledRun("controlled", whole_car()), LabelledRun("off", whole_car(2.0))]
-    save_page(file, page(runs))
+    file.write_text(page(runs), "utf-8")
     return file
 
 
@@ -88,8 +87,7 @@ def test_a_side_file_opens_its_run(firefox, tmp_path):
     matrix = "<table class='matrix'><tr><td class='cell'><a href='#cell?id=cell'>0/1</a></td></tr></table>"
     chosen = f"<div class='chosen'><p class='details'></p><template>{embedded(None, 'run')}</template></div>"
     content = f"<div class='choosing' data-folder='data' data-first='cell'>{matrix}{chosen}</div>"
-    head = "<!DOCTYPE html><html lang='en'><meta charset='utf-8'><title>cells</title>"
-    (tmp_path / "page.html").write_text(f"{head}{assets('chooser.js')}<main>{content}</main>", "utf-8")
+    (tmp_path / "page.html").write_text(f"{head_of('cells', 'chooser.js')}<main>{content}</main>", "utf-8")
     firefox.open(tmp_path / "page.html")
     firefox.wait_for(f"document.querySelector('.chosen') && {READY}")
     assert firefox.run(VIEWER + "return viewer.runs[0].rows") == run.time.size

@@ -10,7 +10,7 @@ import pytest
 from lxml import html
 
 from tests.orchestrator.test_fit import TRUTH, folder, run
-from yawbench.figures.style import shown
+from yawbench.figures.display import shown
 from yawbench.measured_cars.fit import load_fit
 
 from .browser import DESK, PHONE, Browser

@@ -7,7 +7,7 @@ import pytest
 
 from tests.orchestrator.recorded import noted
 from tests.refusals import mentions
-from yawbench.figures.style import LabelledRun
+from yawbench.figures.display import LabelledRun
 from yawbench.reports.road import POLYGONS, clipped, ground_of
 from yawbench.reports.viewer import viewer
 from yawbench.vocabulary.friction_table import table_of

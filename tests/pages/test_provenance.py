@@ -18,7 +18,7 @@ from yawbench.orchestrator.results.record_of_plan import run_record
 from yawbench.orchestrator.results.run_record import RunRecord
 from yawbench.orchestrator.scenario.loader import load_scenario
 from yawbench.orchestrator.wiring.make_plan import make_plan
-from yawbench.reports.page_parts import groups_of
+from yawbench.reports.provenance import groups_of
 
 NOW = datetime.now(timezone.utc)
 UNITS = ("driver_sine", "reference_steady_state", "controller_fnn")

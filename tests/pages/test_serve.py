@@ -36,7 +36,7 @@ from yawbench.vocabulary.vehicle import CAR
 
 from .browser import PHONE, Browser
 from .flaws import inaccessible
-from .made_up import whole_car
+from .made_up import data_in, whole_car
 from .test_viewer import labelled
 
 SCENARIO = "fnn_sideslip/25mps"
@@ -276,7 +276,7 @@ def test_a_run_is_made_once_and_ghosts_come_with_it(server):
     made = server.bench._kept[first]
     second = json.loads(run(server, "friction=0.5", earlier=[[first, "before"], ["nothing", "lost"]])[1])
     assert json.loads(run(server)[1])["key"] == first and server.bench._kept[first] is made
-    data = json.loads(re.search(r'<script type="application/json">(.*?)</script>', second["html"])[1])
+    data = data_in(second["html"])
     assert [(one["label"], one["ghost"]) for one in data["runs"]] == [("now", False), ("before", True)]
 
 

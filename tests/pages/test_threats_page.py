@@ -12,7 +12,6 @@ from yawbench.ranking.threat_runs import published_result
 from yawbench.ranking.threat_scores import scored
 from yawbench.ranking.threats import load_threats
 from yawbench.ranking.threats_page import compared_settings, threats_page
-from yawbench.reports.page_parts import save_page
 
 from .browser import DESK, Browser
 from .flaws import flaws_in_print, inaccessible, looks, open_all
@@ -29,7 +28,7 @@ def published():
 def page(published, tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("threats")
     text = threats_page(published, scored(published), folder, "yawbench rank proving_ground/threats")
-    save_page(folder / "report.html", text)
+    (folder / "report.html").write_text(text, "utf-8")
     return folder / "report.html"
 
 

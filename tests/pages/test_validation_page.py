@@ -18,8 +18,8 @@ from tests.orchestrator.test_validation import line, write, write_study
 from yawbench.measured_cars.validation import CrossPlot
 from yawbench.measured_cars.validation_page import validation_page, validation_sentence
 from yawbench.metrics.verdict import apart
-from yawbench.reports.page_parts import save_page
-from yawbench.reports.study_page import chapter, study_page
+from yawbench.reports.page_parts import render
+from yawbench.reports.study_page import chapter
 from yawbench.studies.experiment_result import judge_results
 from yawbench.studies.load_experiment import load_experiment
 
@@ -52,7 +52,7 @@ def made(tmp_path_factory):
 def page(made) -> Path:
     folder, _, validation = made
     file = folder / "validation.html"
-    save_page(file, validation_page(validation))
+    file.write_text(validation_page(validation), "utf-8")
     return file
 
 
@@ -185,9 +185,7 @@ def test_a_study_has_a_chapter_on_its_validations(chromium: Browser, tmp_path, w
     write_run(run, tmp_path / "ramp")
     findings = judge_results(load_experiment(tmp_path / "study.yaml"), tmp_path)
     page = tmp_path / "report.html"
-    page.write_text(
-        study_page(chapter(findings, command="yawbench study", stale={}, folder=tmp_path)), "utf-8"
-    )
+    page.write_text(render(chapter(findings, command="yawbench study", stale={}, folder=tmp_path)), "utf-8")
     tree = html.fromstring(unpacked(page))
     assert len(tree.cssselect("#validations ~ h3")) == len(findings.sections["validations"]) == 2
     near, far = findings.sections["validations"]

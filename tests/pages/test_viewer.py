@@ -15,8 +15,9 @@ from tests.orchestrator.recorded import car, noted, write
 from tests.refusals import each_mentions, mentions
 from yawbench.cli import main
 from yawbench.components.driving.track import LaneChangeParameters, Track
+from yawbench.figures.display import digits_of, shown_unit
 from yawbench.figures.panels import LabelledRun
-from yawbench.figures.style import LINES, digits_of, shown_unit
+from yawbench.figures.style import LINES
 from yawbench.foundation.errors import ResultsError
 from yawbench.orchestrator.results.measurement_results import MeasuredResults
 from yawbench.orchestrator.results.reader import Results
@@ -27,7 +28,6 @@ from yawbench.reports.viewer import (
     Settings,
     View,
     answer_of,
-    assets,
     page,
     still_of,
     viewer,
@@ -39,7 +39,7 @@ from yawbench.vocabulary.wheels import WHEELS
 
 from .browser import DESK, PHONE, Browser
 from .flaws import inaccessible, looks, size_without_samples
-from .made_up import MU, SIZES, data_in, whole_car, without
+from .made_up import MU, SIZES, data_in, head_of, whole_car, without
 
 VIEWER = "const viewer = document.querySelector('.yv').viewer;"
 
@@ -673,8 +673,7 @@ def test_runs_differ_in_grey_print(two):
 def test_several_viewers_share_a_page(chromium, tmp_path):
     parts = [viewer(labelled(whole_car()), name="a"), viewer(labelled(whole_car(), whole_car(2.0)), name="b")]
     file = tmp_path / "report.html"
-    head = '<!DOCTYPE html><html lang="en"><meta charset="utf-8"><link rel="icon" href="data:,">'
-    file.write_text(f"{head}<title>report</title>{assets()}{''.join(parts)}</html>", "utf-8")
+    file.write_text(f"{head_of('report')}{''.join(parts)}</html>", "utf-8")
     chromium.open(file)
     chromium.wait_for("document.querySelectorAll('.yv-ready').length === 2")
     assert chromium.console() == []
@@ -853,7 +852,7 @@ def contrast(one: str, other: str) -> float:
 def test_scripts_lose_comments_and_indentation_alone():
     script = "  // why\n\n  let a = 'b // c';  // d\n/* e */\n"
     assert without_comments(script) == "let a = 'b // c';\n/* e */\n"
-    for file in (ROOT / "yawbench/reports/static").glob("*.js"):
+    for file in (ROOT / "yawbench").glob("*/static/*.js"):
         for line in file.read_text(encoding="utf-8").splitlines():
             assert line.count("`") % 2 == 0  # no text goes over several lines
 

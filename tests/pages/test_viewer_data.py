@@ -11,7 +11,7 @@ import pytest
 
 from tests.orchestrator.recorded import results
 from yawbench.orchestrator.results.reader import Results
-from yawbench.reports.viewer_data import CLOSE, LEVELS, PackedRun, pack
+from yawbench.reports.viewer_data import CLOSE, COARSE, EXACT, FINE, PackedRun, pack
 
 from .made_up import whole_car
 
@@ -21,22 +21,15 @@ RNG = np.random.default_rng(11)
 def unpacked(packed: PackedRun, name: str) -> np.ndarray:
     """Return a column as the browser decodes it, written independently of the script."""
     raw = gzip.decompress(base64.b64decode(packed.block))
-    form, offset, *more = packed.header["columns"][name]
+    offset, base, step = packed.header["time"] if name == "time" else packed.header["columns"][name]
     n = packed.rows
-    if form == "c":
-        return np.full(n, more[0])
-    if form == "r":
-        return np.frombuffer(raw[offset : offset + 4 * n], "<f4").astype(float)
-    size = more[3] if form == "q" else 4
-    planes = np.frombuffer(raw[offset : offset + size * n], np.uint8).reshape(size, n).astype(np.int64)
-    words = sum(planes[k] << (8 * k) for k in range(size))
-    if form == "f":
-        return (np.cumsum(words) & 0xFFFFFFFF).astype("<u4").view("<f4").astype(float)
-    first, step, order, _ = more
-    codes = (words >> 1) ^ -(words & 1)
-    for _ in range(order):
-        codes = np.cumsum(codes) & (256**size - 1)
-    return (first + codes) * step
+    planes = np.frombuffer(raw[offset : offset + 4 * n], np.uint8).reshape(4, n).astype(np.int64)
+    words = sum(planes[k] << (8 * k) for k in range(4))
+    codes = np.cumsum(np.cumsum((words >> 1) ^ -(words & 1))).astype("<i4")
+    values = base + codes * step
+    for code, value in ((-1, np.nan), (-2, -np.inf), (-3, np.inf)):
+        values[codes == code] = value
+    return values
 
 
 def made(*, rows: int = 500, **columns: np.ndarray) -> Results:
@@ -51,7 +44,7 @@ def test_every_sample_is_within_half_a_step_of_the_recorded_one():
             ends = [(one.columns[name].min(), one.columns[name].max()) for one in runs]
             span = max(high for _, high in ends) - min(low for low, _ in ends)
             error = np.max(np.abs(unpacked(packed, name) - values))
-            assert error <= 0.5 * span / LEVELS[2] * (1 + 1e-9), name
+            assert error <= 0.5 * span / COARSE * (1 + 1e-9), name
 
 
 @pytest.mark.parametrize("scale", [1e-6, 1.0, 1e7])
@@ -72,7 +65,7 @@ def test_any_shape_of_signal_survives(scale):
     for name, values in run.columns.items():
         values = np.asarray(values, float)
         error = np.max(np.abs(unpacked(packed, name) - values))
-        assert error <= 0.5 * np.ptp(values) / LEVELS[2] * (1 + 1e-6) + 1e-15 * np.max(np.abs(values)), name
+        assert error <= 0.5 * np.ptp(values) / COARSE * (1 + 1e-6) + 1e-15 * np.max(np.abs(values)), name
 
 
 def test_zero_is_exactly_zero():
@@ -86,30 +79,42 @@ def test_a_difference_of_close_runs_is_no_rounding():
     apart = 1e-4 * np.cos(np.linspace(0, 9, 500))
     assert np.max(np.abs(apart)) < CLOSE * np.ptp(one)
     runs = pack([made(x=one), made(x=one + apart), made(x=5.0 * one)])
-    assert [run.columns["plant.x"].numbers[-1] for run in runs] == [3, 3, 2]
+    steps = np.array([run.columns["plant.x"].step for run in runs])
+    np.testing.assert_allclose(steps, 10.0 * np.max(one) / np.array([FINE, FINE, COARSE]), rtol=1e-4)
     difference = unpacked(runs[1], "plant.x") - unpacked(runs[0], "plant.x")
-    np.testing.assert_allclose(difference, apart, atol=2e-3 * 1e-4 + 10 / LEVELS[3])
+    np.testing.assert_allclose(difference, apart, atol=2e-3 * 1e-4 + 10 / FINE)
 
 
-@pytest.mark.parametrize("raw", [False, True])
-def test_values_that_are_not_finite_and_raw_ones_are_single_precision(raw):
+@pytest.mark.parametrize("exact", [False, True])
+def test_values_beside_others_that_are_not_finite_have_the_finest_steps(exact):
     values = RNG.normal(size=500)
-    values[7] = np.nan
-    values[9] = np.inf
+    values[7:10] = np.nan, -np.inf, np.inf
     smooth = RNG.normal(size=500)
-    (packed,) = pack([made(x=values, y=smooth, still=np.ones(500))], raw=raw)
-    np.testing.assert_array_equal(unpacked(packed, "plant.x"), values.astype("f4"))
-    assert packed.columns["plant.still"].form == "c"
-    if raw:
-        np.testing.assert_array_equal(unpacked(packed, "plant.y"), smooth.astype("f4"))
+    (packed,) = pack([made(x=values, y=smooth, still=np.ones(500), none=np.full(500, np.nan))], exact=exact)
+    finite = np.isfinite(values)
+    half = 0.51 * np.ptp(values[finite]) / EXACT
+    np.testing.assert_array_equal(unpacked(packed, "plant.x")[~finite], values[~finite])
+    np.testing.assert_allclose(unpacked(packed, "plant.x")[finite], values[finite], rtol=0.0, atol=half)
+    assert np.isnan(unpacked(packed, "plant.none")).all()
+    assert packed.columns["plant.still"].step == 0.0
+    half = 0.51 * np.ptp(smooth) / (EXACT if exact else COARSE)
+    np.testing.assert_allclose(unpacked(packed, "plant.y"), smooth, rtol=0.0, atol=half)
+
+
+@pytest.mark.parametrize("ends", [(-8e307, 8e307), (5.0, np.nextafter(5.0, 6.0)), (0.0, 5e-324)])
+def test_any_range_survives(ends):
+    values = np.array([*ends, ends[0]])
+    (packed,) = pack([results({"plant.x": values}, np.arange(3.0))], exact=True)
+    np.testing.assert_allclose(unpacked(packed, "plant.x"), values, rtol=1e-9, atol=1e-300)
 
 
 def test_constants_and_both_ends_of_a_wire_cost_nothing():
     noise = RNG.normal(size=500)
     (one,) = pack([made(a=noise)])
     (two,) = pack([made(a=noise, b=noise.copy(), still=np.full(500, 3.25))])
-    assert two.block == one.block
-    assert two.header["columns"]["plant.still"] == ["c", 0, 3.25]
+    assert len(two.data) == len(one.data) + 4 * 500  # the codes of constants, all 0
+    assert len(two.block) < len(one.block) + 100
+    np.testing.assert_array_equal(unpacked(two, "plant.still"), np.full(500, 3.25))
     np.testing.assert_array_equal(unpacked(two, "plant.b"), unpacked(two, "plant.a"))
 
 
@@ -121,12 +126,10 @@ def test_text_columns_are_left_out():
 
 def test_even_and_uneven_times():
     even = made(x=np.zeros(500))
-    assert pack([even])[0].header["time"] == ["u", 0, 0.0, 5.0]
+    np.testing.assert_allclose(unpacked(pack([even])[0], "time"), even.time, rtol=1e-15)
     uneven = replace(even, time=np.sort(RNG.uniform(0, 5, 500)))
     (packed,) = pack([uneven])
-    raw = gzip.decompress(base64.b64decode(packed.block))
-    planes = np.frombuffer(raw[: 8 * 500], np.uint8).reshape(8, 500)
-    np.testing.assert_array_equal(np.ascontiguousarray(planes.T).view("<f8").ravel(), uneven.time)
+    np.testing.assert_allclose(unpacked(packed, "time"), uneven.time, rtol=0.0, atol=5.0 / EXACT)
 
 
 def test_a_part_of_the_columns_is_packed_without_packing_again():

@@ -12,7 +12,7 @@ import pytest
 
 from yawbench.figures.panels import LabelledRun
 from yawbench.reports.viewer import Settings, View, page
-from yawbench.reports.viewer_data import LEVELS
+from yawbench.reports.viewer_data import COARSE
 
 from .browser import Browser
 from .made_up import whole_car
@@ -91,9 +91,7 @@ def test_files_of_a_difference_say_so(shown, chromium, three):
     of_b = [row for row in rows if row["run"].startswith(B)]
     expected = whole_car(2.0)["plant.yaw_rate"] - whole_car()["plant.yaw_rate"]
     values = [float(row["plant.yaw_rate [rad/s]"]) for row in of_b]
-    step = (
-        np.ptp([whole_car(2.0)["plant.yaw_rate"].max(), whole_car(2.0)["plant.yaw_rate"].min()]) / LEVELS[2]
-    )
+    step = np.ptp([whole_car(2.0)["plant.yaw_rate"].max(), whole_car(2.0)["plant.yaw_rate"].min()]) / COARSE
     np.testing.assert_allclose(values, expected, atol=2.0 * step)
     assert "reference.yaw_rate_ref [rad/s]" not in rows[0]
 
@@ -156,7 +154,7 @@ def test_values_at_the_cursor_have_no_digits_finer_than_the_samples(fragment, ch
     ranges = [np.ptp([f(run[name]) for run in (whole_car(), whole_car(2.0)) for f in (np.max, np.min)])
               for name in ("plant.sideslip", "plant.yaw_rate")]  # fmt: skip
     times = whole_car().time
-    step = np.degrees(ranges[0]) / LEVELS[2]
+    step = np.degrees(ranges[0]) / COARSE
     many = [chromium.run(AT, float(t)) for t in times[times > 0.6 * times[-1]][::40]]
     texts = [text for row in many for text in row if text not in ("–", "0")]
     assert texts

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import Any
 
-from yawbench.figures.style import shown
+from yawbench.figures.display import shown
 
 LATENCIES = (0, 5, 10, 20)
 CONTROLLERS = {

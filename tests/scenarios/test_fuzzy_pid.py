@@ -11,7 +11,7 @@ from tests.changed import changed
 from tests.commands import status_of
 from tests.refusals import sentence_has
 from tests.studies import check_figures, judge_all, judge_some, verdicts
-from yawbench.figures.style import shown
+from yawbench.figures.display import shown
 from yawbench.metrics.expressions import MetricValue
 from yawbench.orchestrator.results.reader import load_results
 from yawbench.studies.derived import derive

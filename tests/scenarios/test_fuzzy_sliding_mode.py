@@ -13,7 +13,7 @@ from tests.refusals import sentence_has
 from tests.studies import check_figures, judge_all, judge_some, verdicts
 from yawbench.cli import main
 from yawbench.components.control_laws.slip_control import SlipControlParameters
-from yawbench.figures.style import shown
+from yawbench.figures.display import shown
 from yawbench.orchestrator.results.reader import load_results
 from yawbench.studies.jobs import Job, execute
 

@@ -10,7 +10,7 @@ import yawbench as yb
 from tests.refusals import sentence_has
 from tests.studies import check_figures, judge_all, judge_some, verdicts
 from tests.verdicts import recorded
-from yawbench.figures.style import shown
+from yawbench.figures.display import shown
 from yawbench.studies.experiment_result import judge_results
 from yawbench.studies.load_experiment import load_experiment
 from yawbench.studies.result_tables import run_tables

@@ -25,8 +25,9 @@ import os
 import secrets
 import stat
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, suppress
+from dataclasses import dataclass
 from functools import partial
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -34,7 +35,7 @@ from mimetypes import guess_type
 from pathlib import Path
 from urllib.parse import parse_qs, quote, unquote_to_bytes, urlsplit
 
-from yawbench.figures.style import LabelledRun
+from yawbench.figures.display import LabelledRun
 from yawbench.foundation.errors import ResultsError, YawbenchError
 from yawbench.foundation.messages import printable
 from yawbench.foundation.safe_files import NO_FOLLOW
@@ -42,7 +43,7 @@ from yawbench.orchestrator.results.file_formats import FILES
 from yawbench.orchestrator.results.reader import FoundRun, found_runs, load_results
 from yawbench.orchestrator.results.run_folder import RUN_FILE
 from yawbench.orchestrator.scenario import loader
-from yawbench.reports.page_parts import render
+from yawbench.reports.page_parts import Assets, Page, render, static
 from yawbench.reports.viewer import page
 
 from .sliders import Bench, Superseded, wanted_of
@@ -142,6 +143,16 @@ class ResultsServer(ThreadingHTTPServer):
         return "" if hmac.compare_digest(token.encode(), self.token.encode()) else self._paths.get(token)
 
 
+@dataclass(frozen=True, kw_only=True)
+class ResultsPage(Page):
+    """The first page: paths and addresses of pages, paths of runs, names of scenarios for the bench."""
+
+    template = "results.html.j2"
+    pages: Sequence[tuple[str, str]]
+    runs: Sequence[tuple[str, FoundRun]]
+    scenarios: Sequence[str]
+
+
 class Refused(Exception):
     """A request that is answered with a status and a sentence."""
 
@@ -231,11 +242,11 @@ class Request(BaseHTTPRequestHandler):
         folder = self.server.folder
         pages = [(printable(path), f"files/{_quoted(path)}") for path in pages_below(folder)]
         runs = list(runs_below(folder))
-        text = render(
-            "results.html.j2", title=f"Results in {folder}", pages=pages, runs=runs,
-            scenarios=loader.names("a scenario"),
+        view = ResultsPage(
+            title=f"Results in {folder}", pages=pages, runs=runs, scenarios=loader.names("a scenario"),
+            assets=Assets(static("bench.css", __package__), ""),
         )  # fmt: skip
-        self._send_own(text)
+        self._send_own(render(view))
 
     def _file(self, path: str, query: Query) -> None:
         """Send a file from the folder; lead a browser, in which scripts learn the address, to its own."""

@@ -15,11 +15,12 @@ from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass as checked
 
-from yawbench.figures.style import LabelledRun
+from yawbench.figures.display import LabelledRun
 from yawbench.fmus.fmu import Variable, is_path
 from yawbench.fmus.opener import Building, find_folder
 from yawbench.foundation.errors import Interrupted, ScenarioError, YawbenchError
@@ -36,7 +37,7 @@ from yawbench.orchestrator.signal_names import Target
 from yawbench.orchestrator.wiring.context import FACTS, facts_of, reached
 from yawbench.orchestrator.wiring.parameters import value_for
 from yawbench.planner import Planner
-from yawbench.reports.page_parts import render
+from yawbench.reports.page_parts import Page, render
 from yawbench.reports.viewer import Settings, assets, viewer
 from yawbench.reports.viewer_data import PackedRun, pack
 from yawbench.studies.jobs import LASTING, NEEDED, Job, execute, keyed, planned, recorded
@@ -154,6 +155,19 @@ def shown_first(knobs: Sequence[Knob], plan: Plan) -> list[str]:
     return [target for target in wanted if target in known][:FIRST]
 
 
+@dataclass(frozen=True, kw_only=True)
+class BenchPage(Page):
+    """The page with sliders of a scenario."""
+
+    template = "bench.html.j2"
+    scenario: str
+    others: Sequence[str]  # names of scenarios to choose from
+    knobs: Sequence[Knob]  # all values that a slider can change
+    swaps: Sequence[tuple[Instance, list[str]]]  # instances with the FMUs that can take their place
+    wires: Sequence[str]  # that a fault can act on
+    data: dict[str, Any]  # for the script
+
+
 @checked(frozen=True, config=ConfigDict(extra="forbid", strict=True))
 class Wanted:
     """A run that a page asks for.
@@ -234,12 +248,13 @@ class Bench:
             "shown": shown_first(knobs, plan),
             "knobs": {knob.target: asdict(knob) | {"step": knob.step} for knob in knobs},
         }
-        return render(
-            "bench.html.j2", title=plan.title or scenario, scenario=scenario, data=data, knobs=knobs,
+        view = BenchPage(
+            title=plan.title or scenario, scenario=scenario, data=data, knobs=knobs,
             swaps=swaps, others=others,
             wires=[f"{wire.source}.{wire.output} -> {wire.target}" for wire in plan.wires],
-            assets=assets("bench.js"),
+            assets=assets("bench.js", "bench.css", package=__package__),
         )  # fmt: skip
+        return render(view)
 
     def _scenario(self, name: str) -> Path:
         """Return the scenario of a name; a path is refused."""
@@ -305,7 +320,7 @@ class Bench:
             self._turn.release()
         if not outcome.ok:
             raise YawbenchError(list(outcome.diagnostics))
-        (packed,) = pack([outcome.value], raw=True)
+        (packed,) = pack([outcome.value], exact=True)
         self._kept[job.key] = outcome.value, replace(packed, address=f"block/{job.key}")
         while len(self._kept) > KEPT:
             self._kept.popitem(last=False)

@@ -19,7 +19,8 @@ from .options import CHANGES, MAKING, RunOptions, executor_of, named, pooled, ta
 from .output import hold, print_tables, say, say_failed, stoppable, tabular
 
 if TYPE_CHECKING:
-    from yawbench.figures.style import LabelledRun
+    from yawbench.figures.display import LabelledRun
+    from yawbench.reports.study_page import StudyPage
     from yawbench.reports.viewer import View
     from yawbench.studies.dry_run import Forecast, Pace
     from yawbench.studies.executor import Executor
@@ -149,9 +150,8 @@ def chapter_of(
     views: Sequence[View] = (),
     measured: Sequence[LabelledRun] = (),
     each: Each = map,
-    **more: Any,
-) -> dict[str, Any]:
-    """Return the template data of an experiment's page in its folder; `more`: further data."""
+) -> StudyPage:
+    """Return what the page of an experiment in its folder shows; say which runs are out of date."""
     from yawbench.orchestrator.results.freshness import staleness
     from yawbench.orchestrator.results.run_folder import RUN_FILE
     from yawbench.reports.study_page import chapter
@@ -163,12 +163,12 @@ def chapter_of(
         if job.plan and (job.out / RUN_FILE).is_file() and (why := staleness(job.plan, job.out))
     }
     with stoppable(folder):
-        facts = chapter(
+        page = chapter(
             findings, command=command, stale=stale, folder=folder, views=views, measured=measured, each=each
         )
     for name, why in stale.items():
         say(f"{name}: out of date: {why}")
-    return facts | more
+    return page
 
 
 def command_of(preset: str, path: Path, *, quick: bool = False, **options: Iterable[object] | None) -> str:
@@ -180,13 +180,13 @@ def command_of(preset: str, path: Path, *, quick: bool = False, **options: Itera
     return shlex.join(["yawbench", preset, str(path), *flags, *itertools.chain.from_iterable(pairs)])
 
 
-def write_page(facts: dict[str, Any], folder: Path) -> Path:
+def write_page(view: StudyPage, folder: Path) -> Path:
     """Write the page of an experiment into its folder; return its path."""
-    from yawbench.reports.page_parts import PAGE, save_page
-    from yawbench.reports.study_page import study_page
+    from yawbench.foundation.safe_files import write_whole
+    from yawbench.reports.page_parts import PAGE, render
 
     page = folder / PAGE
-    save_page(page, study_page(facts))
+    write_whole(page, render(view))
     output.answer(page=page)
     return page
 
@@ -196,19 +196,20 @@ def say_page(page: Path) -> None:
     say(f"The page: {page} ({page.stat().st_size / 1e6:.1f} MB)")
 
 
-def write_overview(chapters: Sequence[dict[str, Any]], pages: Sequence[Path], folder: Path) -> Path:
+def write_overview(chapters: Sequence[StudyPage], pages: Sequence[Path], folder: Path) -> Path:
     """Write the overview of several experiments into a folder; return its path."""
     import os
 
-    from yawbench.reports.page_parts import PAGE, RANKING, save_page
-    from yawbench.reports.study_page import overview_page
+    from yawbench.foundation.safe_files import write_whole
+    from yawbench.reports.overview_page import overview_page
+    from yawbench.reports.page_parts import PAGE, RANKING
 
     def address(page: Path) -> str:
         return Path(os.path.relpath(page, folder)).as_posix()
 
     page = folder / PAGE
     ranking = address(RANKING) if RANKING.is_file() else ""
-    save_page(page, overview_page(chapters, [*map(address, pages)], folder, ranking))
+    write_whole(page, overview_page(chapters, [*map(address, pages)], folder, ranking))
     output.answer(page=page)
     return page
 
@@ -412,6 +413,6 @@ def tune(context: typer.Context, file: TuningFile, options: RunOptions, seed: Tu
         plugins.require("use of a tuning", "entries")(experiment, tuned, folder, command)
     save(history_figure(experiment, tuned, command), folder / "history")
     charts = [image_of(folder / "history.svg", experiment.spec.title)]
-    facts: dict[str, Any] = {"results": [table], "charts": charts}
-    say_page(write_page(chapter_of(findings, folder, command, **facts), folder))
+    chapter = chapter_of(findings, folder, command)
+    say_page(write_page(replace(chapter, results=[table], charts=charts), folder))
     output.answer(experiments=[data_of(findings, folder)])

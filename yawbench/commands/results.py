@@ -279,9 +279,10 @@ def plot(
     """
     import matplotlib
 
+    from yawbench.figures.display import LabelledRun
     from yawbench.figures.panels import check_panels
     from yawbench.figures.plots import OVERVIEW, draw, shown_by, size_of_style
-    from yawbench.figures.style import KINDS, LabelledRun, save
+    from yawbench.figures.style import KINDS, save
     from yawbench.studies.comparison import FIGURES
 
     settings = _settings(style, size)
@@ -358,8 +359,8 @@ def write_view(
     Raises:
         ResultsError: a run cannot be read, or the page cannot be written.
     """
-    from yawbench.figures.style import LabelledRun
-    from yawbench.reports.page_parts import save_page
+    from yawbench.figures.display import LabelledRun
+    from yawbench.foundation.safe_files import write_whole
     from yawbench.reports.viewer import SETTINGS, Settings, View, page
 
     read = read_runs(folders, start)
@@ -367,7 +368,7 @@ def write_view(
     text = page(runs, Settings((View(panels=panels),)) if panels else SETTINGS)
     file = out or folder_of_all(folders) / "view.html"
     try:
-        save_page(file, text, named=out is not None)
+        write_whole(file, text, named=out is not None)
     except OSError as error:
         raise ResultsError(
             f"{file}: cannot write the page: {error.strerror or error}", code="results-unwritable"

@@ -6,7 +6,7 @@ import contextlib
 import textwrap
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -21,7 +21,7 @@ from .output import hold, print_tables, say, shows_bars, tabular
 from .results import MeasuredFrom, MeasuredRuns, distinct, start_of, with_segments
 
 if TYPE_CHECKING:
-    from yawbench.figures.style import LabelledRun
+    from yawbench.figures.display import LabelledRun
 
 
 MetricsOption = Annotated[
@@ -197,8 +197,10 @@ def compare(
     Without --out, results go to results/<folder of the scenario>/<its name>-compare. A run that
     fails is reported; the other runs continue.
     """
+    from dataclasses import replace
+
     from yawbench.orchestrator.results.folder_names import default_folder
-    from yawbench.reports.comparison import comparison_facts
+    from yawbench.reports.comparison import comparison_view
     from yawbench.studies.comparison import comparison, comparison_table
 
     recordings = labelled_recordings(measured, begin)
@@ -209,10 +211,10 @@ def compare(
     print_tables([comparison_table(findings)])
     beside = {"measured": measured, "from": [begin]} if measured else {}
     command = command_of("compare", scenario, **options.changing | {"swap": swap} | beside)
-    facts = comparison_facts(findings)
-    views = facts["views"] if facts else []
-    chapter = chapter_of(findings, folder, command, views=views, measured=recordings, comparison=facts)
-    say_page(write_page(chapter, folder))
+    compared = comparison_view(findings)
+    views = compared.views if compared else []
+    chapter = chapter_of(findings, folder, command, views=views, measured=recordings)
+    say_page(write_page(replace(chapter, comparison=compared), folder))
     output.answer(experiments=[data_of(findings, folder)])
     if findings.failed:
         raise typer.Exit(1)
@@ -220,7 +222,7 @@ def compare(
 
 def labelled_recordings(measured: Sequence[Path] | None, begin: str) -> list[LabelledRun]:
     """Return the segments of measurement files, as runs that begin at a time of theirs."""
-    from yawbench.figures.style import LabelledRun
+    from yawbench.figures.display import LabelledRun
     from yawbench.orchestrator.results.measurement_results import load_run
 
     places, start = with_segments((), measured), start_of(begin)
@@ -313,8 +315,8 @@ def converge(
         figure = convergence_figure(rows, signal, experiment.spec.title, note)
         save(figure, folder / "converge")
         charts = [image_of(folder / "converge.svg", experiment.spec.title)]
-    facts: dict[str, Any] = {"results": [table], "charts": charts}
-    say_page(write_page(chapter_of(findings, folder, command, **facts), folder))
+    chapter = chapter_of(findings, folder, command)
+    say_page(write_page(replace(chapter, results=[table], charts=charts), folder))
     if any(row.failed for row in rows):
         raise typer.Exit(1)
 
@@ -334,7 +336,8 @@ def diff(first_run: FirstRun, second_run: SecondRun, begin: MeasuredFrom = "0 s"
     largest value), and the largest difference. The filter of a measurement acts on the other run, too, which
     is interpolated to the times of the measurement. Exit status 1 if nothing could be compared.
     """
-    from yawbench.reports.comparison import differences, differences_table, divergence, outcome_table
+    from yawbench.reports.divergence import divergence, outcome_table
+    from yawbench.reports.record_differences import differences, differences_table
 
     from .results import distinct, read_runs, start_of
 

@@ -260,7 +260,6 @@ class EvaluatedRuns:
         """
         from yawbench.foundation.safe_files import write_whole
         from yawbench.reports.evaluation_page import evaluation_page
-        from yawbench.reports.page_parts import save_page
         from yawbench.studies.evaluation_tables import run_table, runs_table
 
         drawn = self._draw(each=each, together=together)
@@ -279,7 +278,7 @@ class EvaluatedRuns:
             table = runs_table(self.series.runs if self.series else self.judged, self.test, self.series)
         print_tables([table])
         page = evaluation_page(self.test, self.traces, self.judged, self.series)
-        save_page(self.folder / PAGE, page)
+        write_whole(self.folder / PAGE, page)
         also = f", {counted(drawn, 'figure')}" if drawn else ""
         say(f"{self.folder / FILE}, {PAGE}{also}")
 

@@ -18,6 +18,7 @@ from yawbench.orchestrator.recordings.gaps import gaps_noted
 from yawbench.orchestrator.results.run_folder import RunStatus
 from yawbench.orchestrator.scenario.overrides import changed, fmu_of
 
+from .display import LabelledRun, digits_of
 from .panels import Panel, panels_of
 from .style import (
     NARROW,
@@ -25,8 +26,6 @@ from .style import (
     ROW,
     STYLES,
     WIDTH,
-    LabelledRun,
-    digits_of,
     frame,
     new_figure,
     own_size,

@@ -133,8 +133,9 @@ def draw_measurement(file: Path, measurement: Measurement, out: Path) -> None:
         ScenarioError: the format is unknown.
         ResultsError: the figure cannot be written.
     """
+    from yawbench.figures.display import LabelledRun
     from yawbench.figures.plots import draw
-    from yawbench.figures.style import KINDS, LabelledRun, save
+    from yawbench.figures.style import KINDS, save
     from yawbench.orchestrator.results.measurement_results import (
         filtered_alike,
         measured_results,
@@ -172,7 +173,6 @@ def fit(context: typer.Context, file: FitFile, options: RunOptions) -> None:
     from yawbench.foundation.safe_files import write_whole
     from yawbench.orchestrator.results.folder_names import default_folder
     from yawbench.planner import Planner
-    from yawbench.reports.page_parts import save_page
 
     from .fit import load_fit
     from .fit_page import fit_page, parameter_table, score_table
@@ -198,7 +198,7 @@ def fit(context: typer.Context, file: FitFile, options: RunOptions) -> None:
     for model in result.models:
         if model.estimate.message != CONVERGED:
             say(f"note: {model.title}: the search ended early: {model.estimate.message} (most_sets)")
-    save_page(folder / "fit.html", fit_page(result))
+    write_whole(folder / "fit.html", fit_page(result))
     say(f"Written: {folder / 'fit.json'}, vehicle.yaml, fit.html")
 
 
@@ -266,7 +266,6 @@ def validate(
     from yawbench.foundation.safe_files import write_whole
     from yawbench.orchestrator.recordings.measurement import load_measurement
     from yawbench.orchestrator.results.measurement_results import load_run
-    from yawbench.reports.page_parts import save_page
 
     from .validation import compare_run, load_bands
     from .validation_page import conditions_table, validation_page, validation_table
@@ -288,7 +287,7 @@ def validate(
         say(f"{'note' if diagnostic.severity == 'info' else 'warning'}: {diagnostic}")
     written = [str(out / "validation.json"), *(path.name for path in drawing)]
     if page:
-        save_page(out / "validation.html", validation_page(validation))
+        write_whole(out / "validation.html", validation_page(validation))
         written.append("validation.html")
     say(", ".join(written))
     if not validation.holds:

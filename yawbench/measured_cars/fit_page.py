@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from yawbench.figures.style import LabelledRun, shown_unit
+from yawbench.figures.display import LabelledRun, shown_unit
 from yawbench.foundation.messages import counted, span
 from yawbench.measured_cars.fit_result import PARTS, FitResult, FittedModel
 from yawbench.measured_cars.least_squares import LEAST_PIECES
@@ -16,7 +16,7 @@ from yawbench.metrics.expressions import MetricValue
 from yawbench.orchestrator.results.measurement_results import MeasuredResults
 from yawbench.orchestrator.results.reader import Results
 from yawbench.reports.evaluation_page import drawn
-from yawbench.reports.page_parts import document
+from yawbench.reports.page_parts import Document, render
 from yawbench.reports.viewer import LARGEST, Settings, View, assets, viewer
 from yawbench.studies.tables import Table
 from yawbench.vocabulary.signals import SIGNALS
@@ -41,8 +41,8 @@ def fit_page(result: FitResult) -> str:
     if "acceleration_y" in names and len(names) > 1:
         others = [name for name in names if name != "acceleration_y"]
         views.append(View("over lateral acceleration", others, x="plant.acceleration_y"))
-    return document(
-        result.fit.spec.title,
+    view = Document(
+        title=result.fit.spec.title,
         sentence=f"{result.verdict[:1].upper()}{result.verdict[1:]}.",
         below=" · ".join(filter(None, (measurement.title, measurement.origin))),
         viewer=viewer(runs, Settings(views, metrics=(), largest=LARGEST), name="fit", alone=True),
@@ -53,6 +53,7 @@ def fit_page(result: FitResult) -> str:
         ],
         assets=assets(),
     )
+    return render(view)
 
 
 def _measured(result: FitResult) -> Results:

@@ -14,7 +14,7 @@ from yawbench.studies.claim_schema import RunName
 from yawbench.studies.sections import Section
 
 from .validation import Bands, Validation, compare_run, load_bands
-from .validation_page import validation_facts, validation_table
+from .validation_page import validation_table, validation_view
 
 
 class ValidationSpec(StrictModel):
@@ -57,5 +57,5 @@ def _compare(results: Mapping[str, Results], recordings: Recordings) -> list[Val
 
 VALIDATIONS = Section(
     ValidationSpec, "Runs to be compared with measured cars", _load, _compare, validation_table,
-    validation_facts,
+    validation_view,
 )  # fmt: skip

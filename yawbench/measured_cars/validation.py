@@ -30,7 +30,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 from pydantic import AfterValidator, Field, WithJsonSchema
 
-from yawbench.figures.style import CHANGED, frame, line_style, new_figure, shown_unit
+from yawbench.figures.display import shown_unit
+from yawbench.figures.style import CHANGED, frame, line_style, new_figure
 from yawbench.foundation.errors import Diagnostic, ResultsError, ScenarioError, code_of, warnings_in
 from yawbench.foundation.messages import counted, hint, resolved
 from yawbench.foundation.safe_files import reads

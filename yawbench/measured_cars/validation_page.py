@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 from markupsafe import Markup
 
-from yawbench.figures.style import LabelledRun, shown
+from yawbench.figures.display import LabelledRun, shown
 from yawbench.foundation.messages import listed
 from yawbench.measured_cars.validation import Validation
 from yawbench.metrics.measures import words
@@ -15,7 +15,7 @@ from yawbench.metrics.verdict import SYMBOLS, apart, worded
 from yawbench.orchestrator.results.measurement_results import MeasuredResults
 from yawbench.orchestrator.results.reader import Results
 from yawbench.reports.evaluation_page import drawn
-from yawbench.reports.page_parts import document
+from yawbench.reports.page_parts import Document, render
 from yawbench.reports.viewer import LARGEST, Settings, View, assets, viewer
 from yawbench.studies.tables import Table
 
@@ -44,30 +44,21 @@ def conditions_table(validation: Validation) -> Table:
 
 def validation_page(validation: Validation) -> str:
     """Return the page of a run compared with measurements."""
-    facts = validation_facts(validation)
-    return document(
-        f"Validation: {validation.title}",
-        sentence=facts["sentence"],
-        warnings=facts["warnings"],
-        below=facts["below"],
-        first=[facts["verdicts"]],
-        viewer=facts["viewer"],
-        sections=[("", [facts["conditions"]])],
-        assets=assets(),
+    view = validation_view(validation)
+    return render(replace(view, title=f"Validation: {validation.title}", assets=assets()))
+
+
+def validation_view(validation: Validation, name: str = "validation") -> Document:
+    """Return what a page shows of a validation; `name`: anchor of its viewer."""
+    return Document(
+        title=f"{validation.title}, against {validation.measured}",
+        sentence=validation_sentence(validation),
+        warnings=[str(diagnostic) for diagnostic in validation.diagnostics],
+        below=" · ".join(filter(None, [validation.measured, validation.origin])),
+        first=[validation_table(validation)],
+        viewer=viewer(*_cross_plots(validation), name=name) if validation.plots else Markup(""),
+        sections=[("", [conditions_table(validation)])],
     )
-
-
-def validation_facts(validation: Validation, name: str = "validation") -> dict[str, Any]:
-    """Return the template data of a validation; `name`: anchor of its viewer."""
-    return {
-        "title": f"{validation.title}, against {validation.measured}",
-        "sentence": validation_sentence(validation),
-        "warnings": [str(diagnostic) for diagnostic in validation.diagnostics],
-        "below": " · ".join(filter(None, [validation.measured, validation.origin])),
-        "verdicts": validation_table(validation),
-        "conditions": conditions_table(validation),
-        "viewer": viewer(*_cross_plots(validation), name=name) if validation.plots else Markup(""),
-    }
 
 
 def validation_sentence(validation: Validation) -> str:

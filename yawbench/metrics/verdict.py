@@ -88,7 +88,7 @@ class WithUnit:
 
     @property
     def shown_in(self) -> str:
-        """The unit for `figures.style.shown`: "%" for a ratio in per cent."""
+        """The unit for `figures.display.shown`: "%" for a ratio in per cent."""
         return PERCENT if self.percent else self.unit
 
 

@@ -36,7 +36,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from yawbench.figures.style import shown
+from yawbench.figures.display import shown
 from yawbench.foundation.messages import listed
 from yawbench.metrics.measures import running_integral
 from yawbench.metrics.verdict import NotJudged, Status, Verdict, apart, compare, not_judged, worded, worst

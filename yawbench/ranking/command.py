@@ -131,7 +131,7 @@ def _rank_by_threats(
     """Search the levels that entries survive; write tables and page."""
     from yawbench.foundation.safe_files import write_whole
     from yawbench.orchestrator.results.folder_names import default_folder
-    from yawbench.reports.page_parts import PAGE, save_page
+    from yawbench.reports.page_parts import PAGE
     from yawbench.studies.tables import records_in, to_csv
 
     from .threat_runs import run_threats, table_of_levels, table_of_quantities
@@ -158,7 +158,7 @@ def _rank_by_threats(
     write_whole(folder / "scores.csv", to_csv(table_of_scores(table)))
     page = folder / PAGE
     command = command_of("rank", file, quick=quick, controller=controller, condition=[*chosen])
-    save_page(page, threats_page(result, table, folder, command))
+    write_whole(page, threats_page(result, table, folder, command))
     say(f"The page: {page} ({page.stat().st_size / 1e6:.1f} MB)")
     output.answer(folder=folder, page=page, entries=records_in(table_of_scores(table)))
     print_tables([main_table(result, table)])
@@ -191,7 +191,7 @@ def _write(ranked: RankingResult, folder: Path, command: str, each: Each) -> Non
     """Draw the figures, write tables, page and side files, and print where the page is."""
     from yawbench.figures.style import save
     from yawbench.foundation.safe_files import write_whole
-    from yawbench.reports.page_parts import PAGE, save_page
+    from yawbench.reports.page_parts import PAGE
     from yawbench.studies.experiment import FIGURES
     from yawbench.studies.tables import to_csv
 
@@ -216,5 +216,5 @@ def _write(ranked: RankingResult, folder: Path, command: str, each: Each) -> Non
     except ResultsError as error:
         say(f"{FIGURES}/pareto: {error}")
     page = folder / PAGE
-    save_page(page, ranking_page(ranked, folder, command, each))
+    write_whole(page, ranking_page(ranked, folder, command, each))
     say(f"The page: {page} ({page.stat().st_size / 1e6:.1f} MB)")

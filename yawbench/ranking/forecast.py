@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Sequence
 
-from yawbench.figures.style import shown
+from yawbench.figures.display import shown
 from yawbench.studies.dry_run import LINE, Forecast, Pace, Span, add_jobs
 from yawbench.studies.executor import Executor
 from yawbench.studies.experiment_result import judge_records

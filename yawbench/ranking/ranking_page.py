@@ -5,11 +5,15 @@ from __future__ import annotations
 import math
 import shlex
 from collections import Counter
+from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import NamedTuple
 
-from yawbench.figures.style import LabelledRun
+from markupsafe import Markup
+
+from yawbench.figures.display import LabelledRun
 from yawbench.foundation.errors import ResultsError, ScenarioError
 from yawbench.foundation.messages import counted, in_text, listed
 from yawbench.metrics.verdict import NotJudged
@@ -17,7 +21,7 @@ from yawbench.orchestrator.results.reader import Results, load_results
 from yawbench.orchestrator.scenario.overrides import changed
 from yawbench.proving_ground.sine_with_dwell import RATIOS, SPUN, course_of
 from yawbench.proving_ground.trace import trace_of
-from yawbench.reports.page_parts import FigureImage, anchor, image_of, option_of, render
+from yawbench.reports.page_parts import FigureImage, Page, Part, anchor, image_of, option_of, render
 from yawbench.reports.viewer import DATA, Settings, View, assets, carried, embedded, tidy_sides, write_side
 from yawbench.studies.experiment import FIGURES
 from yawbench.studies.experiment_result import Each
@@ -66,6 +70,80 @@ OTHERS = ("speed_lost", "intervention", "chatter")
 """Numbers of a cell shown in addition to headroom and sideslip."""
 
 
+class MatrixCell(NamedTuple):
+    """A cell of the matrix: key of its side file, state and words."""
+
+    id: str
+    state: str
+    words: str
+
+
+@dataclass(frozen=True)
+class MatrixRow:
+    """A row of the matrix, in words; `together`: rows that share the place, 0 below the first of them."""
+
+    place: str
+    together: int
+    title: str
+    passed: str
+    interval: str
+    share: str
+    cells: Sequence[MatrixCell]
+
+
+@dataclass(frozen=True, kw_only=True)
+class RankingPage(Page):
+    """The page of a ranking.
+
+    Attributes:
+        source, notes, rule: of the ranking.
+        first: headings before those of the conditions.
+        described, entries: conditions, controllers.
+        command, folder: that repeats it; of its results.
+    """
+
+    template = "ranking.html.j2"
+    answer: str  # the result in sentences
+    source: str
+    notes: Sequence[str]
+    rule: str = RULE
+    quick: bool  # whether it is a quick look
+    missing: Sequence[str]  # controllers without a place
+    first: Sequence[str] = ("place", "controller", "passed", "95 %", "runs")
+    conditions: Sequence[tuple[str, str]]  # short and whole title
+    rows: Sequence[MatrixRow]  # of the matrix
+    first_cell: str  # key of the cell that is shown first
+    data_folder: str = DATA  # of the side files
+    frame: Markup  # the viewer for a cell's worst run
+    pareto: FigureImage | None  # figure of stability over intervention; None: nothing to draw
+    table: Table  # all numbers
+    described: Table
+    entries: Table
+    command: str
+    folder: Path
+
+
+@dataclass(frozen=True, kw_only=True)
+class CellPart(Part):
+    """What the page shows beside the matrix for a chosen cell.
+
+    Attributes:
+        title, state, says: of the cell.
+        again, command: that repeat its runs, and the regulation's whole series of them.
+    """
+
+    template = "ranking_cell.html.j2"
+    title: str
+    state: str
+    says: str
+    sums: Sequence[tuple[str, str]]  # numbers over its runs
+    repeats: int  # number of seeds
+    table: Table  # of its runs
+    again: str
+    command: str
+    worst: str  # which is its worst run
+
+
 def ranking_page(ranked: RankingResult, folder: Path, command: str, each: Each = map) -> str:
     """Return the page as HTML, and write a side file for every cell: its numbers and its worst run.
 
@@ -85,32 +163,26 @@ def ranking_page(ranked: RankingResult, folder: Path, command: str, each: Each =
         (cell for _, cell in cells if cell.state in (RankedState.FAILED, RankedState.SPUN)), cells[0][1]
     )
     table = table_of(ranked)
-    return render(
-        "ranking.html.j2",
+    view = RankingPage(
         title=ranking.spec.title,
         answer=answer(ranked),
         source=ranking.spec.source,
-        rule=RULE,
         notes=ranking.spec.notes,
         quick=ranking.quick,
         missing=[score.spec.title for score in ranked.scores if score.missing],
-        first=["place", "controller", "passed", "95 %", "runs"],
-        conditions=[
-            {"short": condition.heading, "title": condition.title}
-            for condition in ranking.conditions.values()
-        ],
+        conditions=[(condition.heading, condition.title) for condition in ranking.conditions.values()],
         rows=_rows(ranked, digits),
         first_cell=_id(lost),
-        sides=DATA,
         frame=embedded(None, "run"),
         pareto=_image(folder / FIGURES / "pareto.svg", "Stability over intervention"),
         table=Table("", table.columns, table.rows),
         described=_conditions(ranked),
         entries=_entries(ranked),
         command=command,
-        folder=str(folder),
-        assets=assets("chooser.js"),
+        folder=folder,
+        assets=assets("chooser.js", "ranking.js", "ranking.css", package=__package__),
     )
+    return render(view)
 
 
 def answer(ranked: RankingResult) -> str:
@@ -165,30 +237,26 @@ def _image(file: Path, title: str) -> FigureImage | None:
     return image_of(file, title) if file.is_file() else None
 
 
-def _rows(ranked: RankingResult, digits: Digits) -> list[dict[str, Any]]:
-    """Return the rows of the matrix; `together`: rows that share a place, 0 below the first of them."""
+def _rows(ranked: RankingResult, digits: Digits) -> list[MatrixRow]:
+    """Return the rows of the matrix."""
     sharing = Counter(score.place for score in ranked.scores)
     rows = []
     for number, score in enumerate(ranked.scores):
         first = number == 0 or not score.place or ranked.scores[number - 1].place != score.place
-        rows.append({
-            "place": place_words(score),
-            "together": (sharing[score.place] if score.place else 1) if first else 0,
-            "title": score.spec.title,
-            "passed": f"{score.count(RankedState.PASSED)}/{len(score.cells)}"
-            if score.place
-            else f"{score.missing} missing",
-            "interval": interval_words(score) or "–",
-            "share": row_of(score, digits)["runs"] if score.place else "–",
-            "cells": [
-                {
-                    "id": _id(cell),
-                    "state": cell.state.value,
-                    "words": sign_of(cell),
-                }
-                for cell in score.cells.values()
-            ],
-        })  # fmt: skip
+        passed = f"{score.count(RankedState.PASSED)}/{len(score.cells)}"
+        rows.append(
+            MatrixRow(
+                place=place_words(score),
+                together=(sharing[score.place] if score.place else 1) if first else 0,
+                title=score.spec.title,
+                passed=passed if score.place else f"{score.missing} missing",
+                interval=interval_words(score) or "–",
+                share=str(row_of(score, digits)["runs"]) if score.place else "–",
+                cells=[
+                    MatrixCell(_id(cell), cell.state.value, sign_of(cell)) for cell in score.cells.values()
+                ],
+            )
+        )
     return rows
 
 
@@ -213,19 +281,18 @@ def _side(
         f"{score.spec.title}, {'right' if worst.amplitude < 0 else 'left'} first, {degrees(worst.amplitude)}"
     )
     shows = worst.results is not None and worst.results.is_dir()
-    details = {
-        "title": f"{score.spec.title}: {condition.title}",
-        "state": cell.state.value,
-        "says": STATES[cell.state],
-        "sums": [(name, text) for name, text in sums.items() if text is not None],
-        "repeats": len({run.repeat for run in cell.runs}),
-        "table": runs_table(cell),
-        "command": series_command(ranked, cell),
-        "again": again_command(ranked, cell, folder),
-        "worst": f"Its worst run: {label}, {state_words(worst)}." if shows else "Its runs kept no results.",
-    }  # fmt: skip
-    html = render("ranking_cell.html.j2", cell=details)
-    return _id(cell), label, worst.results if shows else None, html, folder
+    details = CellPart(
+        title=f"{score.spec.title}: {condition.title}",
+        state=cell.state.value,
+        says=STATES[cell.state],
+        sums=[(name, text) for name, text in sums.items() if text is not None],
+        repeats=len({run.repeat for run in cell.runs}),
+        table=runs_table(cell),
+        command=series_command(ranked, cell),
+        again=again_command(ranked, cell, folder),
+        worst=f"Its worst run: {label}, {state_words(worst)}." if shows else "Its runs kept no results.",
+    )
+    return _id(cell), label, worst.results if shows else None, render(details), folder
 
 
 def _write_side(key: str, label: str, results: Path | None, html: str, folder: Path) -> None:

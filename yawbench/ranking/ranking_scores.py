@@ -23,7 +23,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from yawbench.figures.style import digits_apart
+from yawbench.figures.display import digits_apart
 from yawbench.fmus.fmu import Value
 from yawbench.foundation.errors import ResultsError
 from yawbench.proving_ground.sine_with_dwell import FROM, RATIOS, SLIGHT, SPUN

@@ -6,7 +6,8 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING
 
-from yawbench.figures.style import QUIET, digits_of, frame, literal, new_figure, shown
+from yawbench.figures.display import digits_of, shown
+from yawbench.figures.style import QUIET, frame, literal, new_figure
 from yawbench.foundation.errors import ResultsError
 from yawbench.metrics.expressions import MetricValue
 from yawbench.proving_ground.sine_with_dwell import percent

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from yawbench.figures.style import digits_of, shown_unit
+from yawbench.figures.display import digits_of, shown_unit
 from yawbench.foundation.messages import counted, in_text
-from yawbench.reports.page_parts import PAGE, RANKING, render
+from yawbench.reports.page_parts import PAGE, RANKING, Page, render
 from yawbench.studies.confidence import Bounds
 from yawbench.studies.tables import Table
 
@@ -409,6 +409,41 @@ def _of_lane_changes(threats: LoadedThreats, setting: str) -> bool:
     return all(threats.spec.threats[name].test == LANE_CHANGE for name in threats.threats_in(setting))
 
 
+@dataclass(frozen=True, kw_only=True)
+class ThreatsPage(Page):
+    """The page of a threat file.
+
+    Attributes:
+        source, notes: of the file.
+        orders, places: without each threat and car.
+        gains, sentence: of gains and laws; empty without them.
+        moves, settings: what other settings change, and their scores.
+        command, folder: that repeats it; of its results.
+    """
+
+    template = "threats.html.j2"
+    answer: str  # the result in sentences
+    source: str
+    notes: Sequence[str]
+    matrix: str  # address of the ranking's page; "": there is none
+    quick: bool  # whether it is a quick look
+    published: str  # on entries with published levels
+    main: Table  # scores of the main setting
+    overview: Table  # all disciplines beside each other
+    levels: Table  # highest levels survived; `cars`: of every threat by car
+    cars: Sequence[Table]
+    orders: Table
+    places: Table
+    gains: Sequence[Table]
+    sentence: str
+    moves: Table
+    settings: Sequence[Table]
+    disciplines: Sequence[Table]  # a table each
+    described: Table  # range and source of every threat
+    command: str
+    folder: Path
+
+
 def threats_page(result: ThreatResult, table: ScoreTable, folder: Path, command: str) -> str:
     """Return the page as HTML.
 
@@ -424,8 +459,7 @@ def threats_page(result: ThreatResult, table: ScoreTable, folder: Path, command:
     gains = compared_gains(result)
     others = compared_settings(result)
     matrix = folder.parent / RANKING.parent.name / PAGE
-    page: str = render(
-        "threats.html.j2",
+    view = ThreatsPage(
         title=threats.spec.title,
         source=threats.spec.source,
         notes=threats.spec.notes,
@@ -446,6 +480,6 @@ def threats_page(result: ThreatResult, table: ScoreTable, folder: Path, command:
         cars=car_tables(result, order),
         described=threats_table(result),
         command=command,
-        folder=str(folder),
+        folder=folder,
     )
-    return page
+    return render(view)

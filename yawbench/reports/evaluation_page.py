@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from yawbench.figures.style import LabelledRun, digits_apart, shown
+from yawbench.figures.display import LabelledRun, digits_apart, shown
 from yawbench.foundation.messages import counted
 from yawbench.metrics.measures import words
 from yawbench.metrics.verdict import SYMBOLS, Status, Verdict, worded, worst
@@ -27,7 +27,7 @@ from yawbench.studies.result_tables import margin_words
 from yawbench.studies.tables import Table
 from yawbench.vocabulary.signals import SIGNALS
 
-from .page_parts import document
+from .page_parts import Document, render
 from .viewer import LARGEST, MOST, Settings, View, assets, viewer
 
 PANELS = ("steering_wheel_angle", "yaw_rate", "sideslip", "acceleration_y", "cone_overrun")
@@ -96,8 +96,8 @@ def evaluation_page(
     runs = [LabelledRun(label, results_of(trace)) for label, trace in zip(labels, traces, strict=True)][:MOST]
     settings = Settings(views, marks=marks, limits=limits, dashed_of=deciding[0], largest=LARGEST)
     dashed = [*(f"{instant:.3f} s: {text}" for instant, text in marks), *map(_limit_words, limits)]
-    return document(
-        f"{test.name.replace('-', ' ').capitalize()}: {counted(len(judged), 'run')}",
+    view = Document(
+        title=f"{test.name.replace('-', ' ').capitalize()}: {counted(len(judged), 'run')}",
         below=f"{test.says[:1].upper()}{test.says[1:]}.",
         sentence=series.summary if series else _sentence(criteria, judged),
         first=[criteria] if criteria.rows else [],
@@ -109,6 +109,7 @@ def evaluation_page(
         ],
         assets=assets(),
     )
+    return render(view)
 
 
 def _sentence(criteria: Table, judged: Sequence[Evaluation]) -> str:

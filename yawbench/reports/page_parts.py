@@ -1,7 +1,8 @@
-"""Parts shared by all pages: templates, style, figures as images, tables of FMUs, parameters with provenance.
+"""What all pages share: the types that templates show, the templates' filters, scripts and figures as images.
 
-The source of a parameter's value is decided when a run is planned, and is part of its record; the source of a
-default is in the FMU that has it.
+A page is a typed view, a subclass of `Page`, that a template shows; a part of a page is a `Part`. Templates
+are in the folder `templates/` of the view's own package, and may extend and import those here; scripts and
+style sheets are in `static/` likewise. So a wing, or a package of somebody else, brings pages of its own.
 """
 
 from __future__ import annotations
@@ -9,110 +10,44 @@ from __future__ import annotations
 import base64
 import functools
 import gzip
-import json
 import os
 import re
-from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 from datetime import datetime, timezone
+from importlib.metadata import distribution
 from importlib.resources import files
 from pathlib import Path
-from types import MappingProxyType
-from typing import Any
-from urllib.parse import quote
+from typing import ClassVar
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
+from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from yawbench.fmus.fmu import Value, Variable
-from yawbench.foundation.messages import fold, printable
-from yawbench.foundation.safe_files import write_whole
+from yawbench.foundation.messages import printable
 from yawbench.metrics.verdict import Status, VerdictText
 from yawbench.orchestrator.plan import (
-    CHOSEN,
-    ERRATUM,
-    LITERATURE,
-    NEUTRAL,
-    PAPER,
-    VARIED,
-    Instance,
     Override,
-    Plan,
-    ValueSource,
 )
-from yawbench.orchestrator.results.reader import Results
 from yawbench.orchestrator.results.record_of_plan import versions
-from yawbench.orchestrator.results.run_record import NOT_RECORDED, RunRecord
 from yawbench.studies.tables import Table
-from yawbench.vocabulary.wheels import WHEEL_NAMES, WHEELS
 
-CURLY = str.maketrans("'\"", "’”")
-"""Typographic quotes for text, so that straight ones occur only in the markup."""
 PAGE = "report.html"
 """File name of the page of a study, a ranking or several studies."""
 RANKING = Path("results/proving_ground/ranking", PAGE)
 """Default path of the ranking's page."""
 
 
-def address_of(svg: str) -> Markup:
-    """Return an SVG image as a short `data:` URL for an attribute in double quotes."""
-    svg = svg[svg.index("<svg") :]
-    svg = re.sub(r"<metadata>.*?</metadata>|<!--.*?-->", "", svg, flags=re.DOTALL)
-    svg = re.sub(r"(?<=>)[^<]+(?=<)", lambda text: text[0].translate(CURLY), svg)
-    svg = svg.replace("'", "").replace('"', "'")
-    svg = re.sub(r" id='[\w.]+_\d+'", "", svg)  # of groups, to which nothing refers
-    svg = re.sub(
-        r"(scale\([^)]*\))|(\.\d)\d+", lambda match: match[1] or match[2], svg
-    )  # a tenth of a point; glyphs keep their aspect ratio
-    svg = re.sub(r"\s*\n\s*", "\n", svg)
-    return Markup("data:image/svg+xml," + quote(svg, safe=" =:/'(),;.-+*!?@$[]{}|^`~"))
-
-
 @dataclass(frozen=True)
 class FigureImage:
-    """A whole figure: its title, and its image as a `data:` URL for an `<img>`."""
+    """A whole figure: its title, and its image as SVG."""
 
     title: str
-    address: Markup
+    svg: str
 
 
 def image_of(file: Path, title: str) -> FigureImage:
     """Return an SVG file as an image."""
-    return FigureImage(title, address_of(file.read_text(encoding="utf-8")))
-
-
-def fmus_of(runs: Iterable[Results | Plan]) -> Table:
-    """Return the table of all FMUs in the runs, taken from their records or plans."""
-    by_fmu: dict[tuple[str, str], dict[str, None]] = {}
-    for run in runs:
-        for instance, name, sha256 in _fmus_in(run):
-            by_fmu.setdefault((name, sha256), {})[instance] = None
-    ordered = sorted(by_fmu.items(), key=lambda item: (min(item[1]), item[0][0]))
-    rows = [(name, ", ".join(instances), sha256) for (name, sha256), instances in ordered]
-    return Table("", ["FMU", "as", "SHA-256"], [*rows])
-
-
-def _fmus_in(run: Results | Plan) -> Iterator[tuple[str, str, str]]:
-    """Yield instance, FMU and its hash."""
-    if isinstance(run, Plan):
-        yield from ((instance.name, instance.fmu.name, instance.fmu.sha256) for instance in run.instances)
-    else:
-        for instance, fmu in run.record.fmus.items():
-            yield instance, fmu.name or instance, fmu.sha256
-
-
-def programs_of(runs: Iterable[Results | Plan]) -> dict[str, str]:
-    """Return the versions of the programs that made the runs, taken from their records.
-
-    Runs without a record, known by their key in the journal, have today's versions: the key includes them.
-    """
-    by_program: dict[str, dict[str, None]] = {}
-    for run in runs:
-        known = versions() if isinstance(run, Plan) else run.record.versions
-        for name, version in known.items():
-            by_program.setdefault(name, {})[str(version)] = None
-    return {name: " and ".join(several) for name, several in by_program.items()}
+    return FigureImage(title, file.read_text(encoding="utf-8"))
 
 
 def option_of(change: Override) -> list[str]:
@@ -145,98 +80,95 @@ SIGNS = {
 """Status -> CSS class and symbol, which differ even without colours."""
 
 
-def render(template: str, facts: Mapping[str, Any] = MappingProxyType({}), **more: Any) -> str:
-    """Render a template; a variable that is missing is an error, not empty text."""
-    return _templates().get_template(template).render(**facts, **more)
+@dataclass(frozen=True, kw_only=True)
+class Part:
+    """What a template shows, as its variable `view`, on a page or as a part of one."""
+
+    template: ClassVar[str]
+    """Name of a file in `templates/` of the package of the class."""
 
 
-MANY = 6
-"""Tables of a section from which on they are folded. Chosen: more hide what comes after them."""
+@dataclass(frozen=True, kw_only=True)
+class Page(Part):
+    """A page: its heading; style sheets and scripts besides those of all pages."""
+
+    title: str
+    assets: Assets | None = None
 
 
-def document(
-    title: str,
-    *,
-    viewer: Markup,
-    assets: Markup,
-    sentence: str = "",
-    changed: str = "",
-    below: str = "",
-    warnings: Sequence[str] = (),
-    first: Sequence[Table] = (),
-    notes: Sequence[str] = (),
-    sections: Sequence[tuple[str, Sequence[Table]]] = (),
-) -> str:
-    """Return a page around a viewer.
+@dataclass(frozen=True, kw_only=True)
+class Document(Page):
+    """A page around a viewer.
 
-    Args:
-        title: its heading.
-        viewer, assets: see `viewer`.
-        sentence: the result.
-        changed: overrides of the scenario that the title names.
-        below: a line on what the data are.
-        warnings: shown below the sentence.
-        first: tables before the viewer.
-        notes: below the viewer.
-        sections: heading, or "", and tables.
+    Attributes:
+        many: tables of a section from which on they are folded. Chosen: more hide what comes after them.
     """
-    return render("document.html.j2", locals() | {"many": MANY})
+
+    template = "document.html.j2"
+    viewer: Markup
+    sentence: str = ""  # the result
+    changed: str = ""  # overrides of the scenario that the title names
+    below: str = ""  # a line on what the data are
+    warnings: Sequence[str] = ()  # shown below the sentence
+    first: Sequence[Table] = ()  # tables before the viewer
+    notes: Sequence[str] = ()  # below the viewer
+    sections: Sequence[tuple[str, Sequence[Table]]] = ()  # heading, or "", and tables
+    many: int = 6
 
 
-def save_page(file: Path, html: str, *, named: bool = False) -> None:
-    """Write a page, packed; `named`: see `write_whole`."""
-    write_whole(file, packed(html), named=named)
-
-
-PACKED = re.compile(
-    r"(?P<start><script(?: type=\"application/json\")?|</summary><template|<img(?= src=\"data:))"
-    r"(?: src=\"(?P<image>[^\"]*)\"|>(?P<text>.*?)(?P<end></script>|</template>))",
-    re.DOTALL,
-)
-"""Scripts, the data of viewers, folded parts and images: what needs JavaScript, or is not read at first."""
-
-
-def packed(html: str) -> str:
-    """Return a page with its scripts and what a reader does not see at first compressed."""
-    texts: list[str] = []
-
-    def emptied(part: re.Match[str]) -> str:
-        texts.append(part["text"] or part["image"] or "")
-        return f"{part['start']} data-packed" + (f">{part['end']}" if part["end"] else "")
-
-    head, opening, script = html.rpartition("<script>")  # the page's own, which unfolds
-    text = PACKED.sub(emptied, head)
-    text_of_all = json.dumps(texts, ensure_ascii=False).encode()
-    block = base64.b64encode(gzip.compress(text_of_all, 9, mtime=0)).decode()
-    carries = f'<script type="text/plain" id="packed">{block}</script>'
-    unpacks = f"<script>\n{static('unpack.js')}</script>\n"
-    return f"{text}{carries}\n{opening}{script.replace('</body>', unpacks + '</body>')}"
-
-
-def static(name: str) -> str:
-    """Return a style sheet or a script of all pages."""
-    return (files(__package__) / "static" / name).read_text(encoding="utf-8")
+def render(view: Part) -> str:
+    """Return a page or a part of one; a variable that is missing is an error, not empty text."""
+    package = type(view).__module__.rpartition(".")[0]
+    return _templates(package).get_template(view.template).render(view=view)
 
 
 @functools.cache
-def _templates() -> Environment:
-    """Return the template environment; each template is compiled once."""
+def _templates(package: str) -> Environment:
+    """Return the environment of a package's templates; each template is compiled once."""
+    places = dict.fromkeys((package, __package__))
     environment = Environment(
-        loader=PackageLoader("yawbench.reports"),
+        loader=ChoiceLoader([PackageLoader(place) for place in places]),
         autoescape=True,
         undefined=StrictUndefined,
         finalize=lambda value: printable(value) if type(value) is str else value,
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {"verdict": verdict_sign, "minus": with_minus}
-    environment.globals |= {"style": style(), "program": f"yawbench {versions()['yawbench']}", "now": now}
+    environment.filters |= {"verdict": verdict_sign, "minus": with_minus, "compressed": compressed}
+    program = f"yawbench {versions()['yawbench']}"
+    environment.globals |= {"static": lambda name: Markup(static(name)), "program": program, "now": now}
     return environment
 
 
-def style() -> Markup:
-    """Return the style sheet shared by all pages with text."""
-    return Markup(static("page.css"))
+def compressed(text: str) -> str:
+    """Return a text compressed by gzip, in base64, for the attribute `data-packed`; see `static/page.js`.
+
+    For what needs JavaScript or is not seen at first: scripts, data, folded parts, images.
+    """
+    return base64.b64encode(gzip.compress(text.encode(), 9, mtime=0)).decode()
+
+
+@dataclass(frozen=True)
+class Assets:
+    """Style sheets and scripts of a page."""
+
+    style: str
+    script: str
+
+
+def static(name: str, package: str = __package__) -> str:
+    """Return a style sheet or a script of a package, of all pages, or of uPlot."""
+    folders = [files(place) / "static" for place in dict.fromkeys((package, __package__))]
+    folders.append(Path(str(distribution("uplot-python").locate_file("uplot/static"))))
+    return next(file for folder in folders if (file := folder / name).is_file()).read_text(encoding="utf-8")
+
+
+def without_comments(script: str) -> str:
+    """Return a script without indentation and `//` comments: 15 kB less in every page.
+
+    Text over several lines would lose its indentation; a test holds that no script has any.
+    """
+    return re.sub(r"^[ \t]*(?://.*)?\n|^[ \t]+|[ \t]+//\s[^'\"`\n]*$", "", script, flags=re.MULTILINE)
 
 
 def with_minus(text: str) -> str:
@@ -250,131 +182,3 @@ def verdict_sign(text: str) -> Markup:
         return Markup.escape(text)
     kind, sign = SIGNS[text.status]
     return Markup('<span class="verdict {}"><b aria-hidden="true">{}</b> {}</span>').format(kind, sign, text)
-
-
-@dataclass
-class PageParameter:
-    """A parameter with its values in all runs of a study."""
-
-    name: str
-    meaning: str
-    unit: str
-    default: ValueSource  # of the FMU's default
-    stated: ValueSource | None = None  # of the value in the scenario or vehicle file
-    set_by_study: bool = False
-    values: dict[str, None] = field(default_factory=dict)  # as text, each once
-
-    @property
-    def origin(self) -> ValueSource:
-        """The provenance of the value that applies where the study does not override it."""
-        return self.stated or self.default
-
-
-@dataclass
-class ParameterGroup:
-    """The parameters of a vehicle file or of an instance's FMU, or the constants of a scenario."""
-
-    title: str
-    below: str
-    parameters: dict[str, PageParameter] = field(default_factory=dict)
-
-    def note(
-        self,
-        name: str,
-        variable: Variable,
-        meaning: str,
-        value: str,
-        origin: ValueSource | None,
-        default: ValueSource,
-    ) -> None:
-        """Add the value of a variable in one run, and its source; None: that of the FMU's default."""
-        row = self.parameters.setdefault(name, PageParameter(name, meaning, variable.unit or "", default))
-        row.values[value] = None
-        if origin is not None and origin.kind == VARIED:
-            row.set_by_study = True
-        else:
-            row.stated = row.stated or origin
-
-
-def groups_of(runs: Sequence[tuple[RunRecord, Plan]]) -> list[ParameterGroup]:
-    """Return all parameters of runs: the vehicles', those of each instance's FMUs, constants.
-
-    Args:
-        runs: the record of each run, and its plan, whose FMUs describe the variables.
-    """
-    vehicles: dict[str, ParameterGroup] = {}
-    units: dict[tuple[str, str], ParameterGroup] = {}
-    constants = ParameterGroup("Constant inputs", "driven by no instance")
-    order: dict[str, None] = {}
-    for record, plan in runs:
-        by_name = {instance.name: instance for instance in plan.instances if instance.name in record.fmus}
-        instances = record.scenario.get("units", {})
-        for name in [name for name in instances if name in by_name]:
-            order[name] = None
-            instance, fmu = by_name[name], record.fmus[name]
-            own = units.setdefault(
-                (name, fmu.name), ParameterGroup(f"{name}: {fmu.name}", instance.fmu.description)
-            )
-            values = fmu.defaults | fmu.parameters
-            own_names = instances[name].get("parameters", {})
-            of_vehicle = record.scenario.get("vehicle_parameters", {}).keys() - own_names
-            for variable in instance.fmu.of("parameter"):
-                if variable.name not in values:
-                    continue
-                group = _vehicle_group(vehicles, record) if variable.name in of_vehicle else own
-                default = _default(record, instance, variable)
-                value, source = text_of(values[variable.name]), record.source(name, variable.name)
-                group.note(variable.name, variable, variable.description, value, source, default)
-            _constants(constants, record, instance)
-    ordered = [units[key] for name in order for key in units if key[0] == name]
-    return [group for group in (*vehicles.values(), *ordered, constants) if group.parameters]
-
-
-def _default(record: RunRecord, instance: Instance, variable: Variable) -> ValueSource:
-    """Return the source of a variable's default, which only the FMU of the run knows."""
-    same = record.fmus[instance.name].sha256 == instance.fmu.sha256
-    return ValueSource.parse(variable.source) if same else NOT_RECORDED
-
-
-def _vehicle_group(vehicles: dict[str, ParameterGroup], record: RunRecord) -> ParameterGroup:
-    """Return the group of a run's vehicle file."""
-    scenario = record.scenario
-    file = Path(os.path.normpath(Path(record.scenario_file).parent / str(scenario.get("vehicle", ""))))
-    title, source = (
-        scenario.get("vehicle_title") or file.stem,
-        scenario.get("vehicle_source", NOT_RECORDED.says),
-    )
-    return vehicles.setdefault(str(file), ParameterGroup(f"The car: {title}", f"{file.name}; {source}"))
-
-
-def _constants(group: ParameterGroup, record: RunRecord, instance: Instance) -> None:
-    """Add the constants of an instance; four equal wheels become one name that ends with `*`."""
-    fmu = record.fmus[instance.name]
-    texts = {name: text_of(value) for name, value in fmu.constants.items()}
-    texts |= {name: f"{series.file}: {series.column}" for name, series in fmu.series.items()}
-    alike: dict[str, list[str]] = {}
-    for name in dict.fromkeys((*instance.constants, *instance.fmu.variables)):
-        if name in texts:
-            alike.setdefault(texts[name], []).append(name)
-    for value_text, names in alike.items():
-        for name in fold(names):
-            first = name.removesuffix("*") + WHEELS[0] if name.endswith("*") else name
-            variable = instance.fmu.variables[first]
-            meaning = variable.description
-            if first != name:
-                meaning = meaning.removesuffix(f", {WHEEL_NAMES[WHEELS[0]]}")
-            source, default = record.source(instance.name, first), _default(record, instance, variable)
-            group.note(f"{instance.name}.{name}", variable, meaning, value_text, source, default)
-
-
-def text_of(value: Value | None) -> str:
-    """Return a value as written in a scenario file, numbers with six digits."""
-    if isinstance(value, bool):
-        return str(value).lower()
-    return f"{value:.6g}" if isinstance(value, float) else str(value)
-
-
-def count_kinds(groups: Iterable[ParameterGroup]) -> dict[str, int]:
-    """Return the number of parameters by kind of provenance."""
-    kinds = Counter(parameter.origin.kind for group in groups for parameter in group.parameters.values())
-    return {kind: kinds[kind] for kind in (PAPER, ERRATUM, CHOSEN, LITERATURE, NEUTRAL) if kind in kinds}

@@ -1,19 +1,21 @@
-"""The page of an experiment, a single HTML file, and the overview of several, with a link to each page.
+"""The page of an experiment, a single HTML file.
 
-A page has the verdicts, runs, system, tables and parameters of the experiment, and how to repeat it; the
-overview has the verdicts of all. A click on a claim there loads its runs from a side file.
+It has the verdicts, runs, system, tables and parameters of the experiment, and how to repeat it.
 """
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from datetime import datetime, timezone
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar, NamedTuple
 
-from yawbench.figures.panels import signals_of
-from yawbench.figures.style import LabelledRun
+from markupsafe import Markup
+
+from yawbench.figures.display import LabelledRun
+from yawbench.figures.phase_portrait import signals_of
 from yawbench.foundation.errors import ResultsError
 from yawbench.foundation.messages import counted, listed
 from yawbench.metrics.expressions import evaluate, metric
@@ -51,11 +53,12 @@ from yawbench.studies.schema import FigureSpec
 from yawbench.studies.sections import sections
 from yawbench.studies.tables import Cell, Table
 
+from .comparison import ComparisonView
 from .diagram import diagram, systems_of
-from .page_parts import FigureImage, anchor, count_kinds, fmus_of, groups_of, image_of, programs_of, render
-from .sweep_view import sweep_sentence, sweep_view, write_sides
+from .page_parts import Document, FigureImage, Page, anchor, image_of
+from .provenance import ParameterGroup, count_kinds, fmus_of, groups_of, programs_of
+from .sweep_view import SWEEP_ASSETS, sweep_sentence, sweep_view, write_sides
 from .viewer import (
-    DATA,
     LARGEST,
     MOST,
     PANELS,
@@ -66,22 +69,108 @@ from .viewer import (
     assets,
     carried,
     embedded,
-    tidy_sides,
-    write_side,
 )
+
+
+@dataclass(frozen=True)
+class JudgedClaim:
+    """A claim or check with its measured values, verdict and margin.
+
+    Attributes:
+        says, source, note: of the file.
+        verdict, margin: in words.
+        agreeing: share [%] of the region's points with the same verdict; None: not judged over a region.
+    """
+
+    says: str
+    source: str
+    note: str
+    measured: Sequence[str]  # the values
+    conditions: Sequence[str]  # of which all must be met
+    verdict: str
+    margin: str | None
+    region: Sequence[str]  # how robust the verdict is, a line each
+    agreeing: float | None
+    robust: bool  # whether less than a tenth of the region flips the verdict
+    lines: Table | None  # values along the lines of the region
+    link: str  # state of the viewer that shows the claim's runs; "" if it has none of them
+
+
+class SystemDrawing(NamedTuple):
+    """The diagram of a set of instances, and the scenarios that it applies to."""
+
+    drawing: Markup
+    runs: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class StudyPage(Page):
+    """The page of an experiment.
+
+    Attributes:
+        claims, checks: as judged.
+        groups, kinds: parameters, and how many have each kind of source.
+        command, folder: that repeats it; of its results.
+        runs, not_made: number of all runs, and of those that were not made yet.
+        fmus, programs: that made the runs.
+    """
+
+    template = "study.html.j2"
+    long: ClassVar[int] = 16
+    """Chosen: with the claims, a page stays below 2,000 elements."""
+    id: str  # anchor on the overview, key of its side file there
+    source: str  # of the experiment
+    changed: str  # overrides from the command line
+    counts: Mapping[str, int]  # verdict of claims -> how many
+    reach: str  # where claims were judged
+    answer: str  # the result in sentences
+    claims: Sequence[JudgedClaim]
+    checks: Sequence[JudgedClaim]
+    region: Table | None  # the open values and their ranges; None: not judged over a region
+    limits: Sequence[Table]  # their tables
+    systems: Sequence[SystemDrawing]  # a diagram for each set of instances
+    content: Carried | None  # of the viewer; None: there are no runs to show
+    sweep: Markup | None  # the view of runs along axes
+    figures: Sequence[tuple[str, str]]  # title and file, without suffix, of those shown in another form
+    charts: Sequence[FigureImage]  # drawn figures, as images
+    tables: Sequence[Table]  # numbers of runs; further ones are folded after `long` rows
+    definitions: Sequence[tuple[str, str, str]]  # heading, definition and formula of the metrics
+    groups: Sequence[ParameterGroup]
+    kinds: Mapping[str, int]
+    failed: Mapping[str, str]  # run -> why
+    stale: Mapping[str, str]  # run -> why its results are not those of its plan
+    remarkable: str  # warnings of runs along axes
+    repeats: str  # what numbers over repeats mean
+    quick: str  # what a quick look leaves out
+    command: str
+    folder: Path
+    settings: Table  # overrides of every run
+    grid: Sequence[str]  # algorithms, step sizes and stop times, with how many runs
+    runs: int
+    not_made: int
+    validations: Sequence[Document]  # of runs, by measured cars
+    fmus: Table
+    programs: Mapping[str, str]
+    comparison: ComparisonView | None = None  # metrics side by side, and where the runs part
+    results: Sequence[Table] = ()  # further tables
+
+    @property
+    def viewer(self) -> Markup | None:
+        """The viewer of its runs."""
+        return embedded(self.content, VIEW) if self.content else None
 
 
 def chapter(
     findings: ExperimentResult,
     *,
     command: str,
-    stale: dict[str, str],
+    stale: Mapping[str, str],
     folder: Path,
     views: Sequence[View] = (),
     measured: Sequence[LabelledRun] = (),
     each: Each = map,
-) -> dict[str, Any]:
-    """Return the template data of an experiment's page; write the side files of its runs along axes.
+) -> StudyPage:
+    """Return what the page of an experiment shows; write the side files of its runs along axes.
 
     Args:
         findings: the experiment and its results.
@@ -93,62 +182,56 @@ def chapter(
         each: `map`, or a parallel equivalent, to write side files with.
     """
     experiment, spec = findings.experiment, findings.spec
-    name = anchor(f"{experiment.path.absolute().parent.name} {experiment.path.stem}")
     plans = plans_of(findings)
     groups = groups_of([(record_of(job, plan), plan) for job, (_, plan) in plans])
     runs = runs_made(findings)
     kinds = [kind for kind, _ in runs]
-    failed = findings.failed
     content, numbers = viewer_of(findings, views, measured)
     sweep = None
     if spec.axes and findings.planned and len(findings.records) > 1:
         sweep = sweep_view(findings, "sweep", write_sides(findings, folder, each))
-
-    def with_link(results: Sequence[ClaimResult]) -> list[dict[str, Any]]:
-        return [judged(result) | {"link": link_to_runs(experiment, result, numbers)} for result in results]
-
-    return {
-        "id": name,
-        "title": spec.title,
-        "source": spec.source,
-        "changed": changed(experiment.by_options),
-        "counts": counts_of(findings.claims),
-        "reach": reach(findings),
-        "answer": " ".join(filter(None, (answer(findings), sweep and sweep_sentence(findings)))),
-        "claims": with_link(findings.claims),
-        "checks": with_link(findings.checks),
-        "region": region_table(findings) if findings.regions else None,
-        "limits": limit_tables(findings),
-        "systems": systems(plans, spec.title),
-        "content": content,
-        "sweep": sweep,
-        "figures": figure_files(findings),
-        "charts": charts(findings, folder / FIGURES),
-        "tables": [*run_tables(findings), *derived_tables(findings, apart=True)],
-        "definitions": definitions(findings),
-        "groups": groups,
-        "kinds": count_kinds(groups),
-        "failed": failed,
-        "stale": stale,
-        "remarkable": findings.remarkable() if spec.axes else "",
-        "repeats": repeats(findings),
-        "quick": experiment.quick,
-        "command": command,
-        "folder": str(folder),
-        "settings": settings(findings),
-        "grid": grid_of_times(runs),
-        "runs": len(findings.records),
-        "not_made": findings.not_made,
-        "comparison": None,
-        "results": [],
-        "validations": [
-            sections()[section].facts(finding, f"{section}-{number}")
-            for section, found in findings.sections.items()
-            for number, finding in enumerate(found, start=1)
-        ],
-        "fmus": fmus_of(kinds),
-        "programs": programs_of(kinds),
-    }
+    validations = [
+        sections()[section].view(finding, f"{section}-{number}")
+        for section, found in findings.sections.items()
+        for number, finding in enumerate(found, start=1)
+    ]
+    return StudyPage(
+        id=anchor(f"{experiment.path.absolute().parent.name} {experiment.path.stem}"),
+        title=spec.title,
+        assets=assets(*SWEEP_ASSETS if sweep else ()) if content or sweep or validations else None,
+        source=spec.source,
+        changed=changed(experiment.by_options),
+        counts=counts_of(findings.claims),
+        reach=reach(findings),
+        answer=" ".join(filter(None, (answer(findings), sweep and sweep_sentence(findings)))),
+        claims=[judged(result, link_to_runs(experiment, result, numbers)) for result in findings.claims],
+        checks=[judged(result, link_to_runs(experiment, result, numbers)) for result in findings.checks],
+        region=region_table(findings) if findings.regions else None,
+        limits=limit_tables(findings),
+        systems=systems(plans, spec.title),
+        content=content,
+        sweep=sweep,
+        figures=figure_files(findings),
+        charts=charts(findings, folder / FIGURES),
+        tables=[*run_tables(findings), *derived_tables(findings, apart=True)],
+        definitions=definitions(findings),
+        groups=groups,
+        kinds=count_kinds(groups),
+        failed=findings.failed,
+        stale=stale,
+        remarkable=findings.remarkable() if spec.axes else "",
+        repeats=repeats(findings),
+        quick=experiment.quick,
+        command=command,
+        folder=folder,
+        settings=settings(findings),
+        grid=grid_of_times(runs),
+        runs=len(findings.records),
+        not_made=findings.not_made,
+        validations=validations,
+        fmus=fmus_of(kinds),
+        programs=programs_of(kinds),
+    )
 
 
 def link_to_runs(experiment: LoadedExperiment, result: ClaimResult, numbers: Mapping[str, int]) -> str:
@@ -232,36 +315,35 @@ def in_sentence(counts: Mapping[str, int]) -> str:
     return listed(parts, last="and")
 
 
-def judged(result: ClaimResult) -> dict[str, Any]:
-    """Return a claim with its measured values and verdict."""
-    return {
-        "says": result.claim.says,
-        "source": result.claim.source,
-        "measured": measured_words(result),
-        "conditions": [str(condition) for condition in result.claim.holds_if],
-        "verdict": verdict(result),
-        "margin": margin_words(result.verdict),
-        "region": region_words(result),
-        "agreeing": result.region and 100 * result.region.agreeing,
-        "robust": result.region is not None and result.region.robust,
-        "lines": line_table(result) if result.region else None,
-        "note": result.claim.note,
-    }
+def judged(result: ClaimResult, link: str) -> JudgedClaim:
+    """Return a claim as the page shows it."""
+    return JudgedClaim(
+        says=result.claim.says,
+        source=result.claim.source,
+        note=result.claim.note,
+        measured=measured_words(result),
+        conditions=[str(condition) for condition in result.claim.holds_if],
+        verdict=verdict(result),
+        margin=margin_words(result.verdict),
+        region=region_words(result),
+        agreeing=100 * result.region.agreeing if result.region else None,
+        robust=result.region is not None and result.region.robust,
+        lines=line_table(result) if result.region else None,
+        link=link,
+    )
 
 
-def systems(plans: Sequence[tuple[Job, tuple[LoadedScenario, Plan]]], title: str) -> list[dict[str, Any]]:
+def systems(plans: Sequence[tuple[Job, tuple[LoadedScenario, Plan]]], title: str) -> list[SystemDrawing]:
     """Return a diagram for each set of instances, with the scenarios that it applies to."""
     drawn = []
     for system, numbers in systems_of([plan for _, (_, plan) in plans]):
         files = dict.fromkeys(plans[k][0].scenario.name for k in numbers)
-        drawn.append({"drawing": diagram(system, title), "runs": ", ".join(files)})
+        drawn.append(SystemDrawing(diagram(system, title), ", ".join(files)))
     return drawn
 
 
 LIVELY = tuple(map(metric, ("peak(sideslip)", "peak(yaw_rate)")))
 """Metrics of how lively a run is; the first that all runs have is used."""
-LONG = 16
-"""Rows of tables; further tables are folded. Chosen: with the claims, a page stays below 2,000 elements."""
 VIEW = "view"
 """Anchor of the viewer."""
 
@@ -324,10 +406,10 @@ def _liveliest(runs: Sequence[LabelledRun]) -> float:
     return 0.0
 
 
-def figure_files(findings: ExperimentResult) -> list[dict[str, str]]:
+def figure_files(findings: ExperimentResult) -> list[tuple[str, str]]:
     """Return title and path, without suffix, of the figures that the page shows in another form."""
     return [
-        {"title": title_of(findings, spec), "file": f"{FIGURES}/{spec.name}"}
+        (title_of(findings, spec), f"{FIGURES}/{spec.name}")
         for spec in findings.spec.figures
         if spec.what.over_axes or (spec.what.shows == "runs" and runs_of(findings, spec))
     ]
@@ -343,15 +425,11 @@ def charts(findings: ExperimentResult, folder: Path) -> list[FigureImage]:
     return drawn
 
 
-def definitions(findings: ExperimentResult) -> list[dict[str, str]]:
+def definitions(findings: ExperimentResult) -> list[tuple[str, str, str]]:
     """Return the definition of every metric of the study."""
     every = [(spec, metric(spec.metric)) for spec in findings.spec.metrics.values()]
     return [
-        {
-            "heading": heading(spec),
-            "definition": f"{chosen.definition}{spec.during('from ')}",
-            "formula": chosen.formula,
-        }
+        (heading(spec), f"{chosen.definition}{spec.during('from ')}", chosen.formula)
         for spec, chosen in every
     ]
 
@@ -385,57 +463,3 @@ def grid_of_times(runs: Iterable[tuple[Results | Plan, int]]) -> list[str]:
             algorithm, step, end = run.record.algorithm, run.record.step_size, run.record.stop_time
         counts[f"{algorithm}, {1000 * step:g} ms, until {end:g} s"] += number
     return [f"{text} ({counted(count, 'run')})" for text, count in counts.items()]
-
-
-def study_page(facts: dict[str, Any]) -> str:
-    """Return the page of an experiment."""
-    content, scripts = facts["content"], ["sweep.js"] if facts["sweep"] else []
-    return render(
-        "study.html.j2",
-        facts,
-        viewer=embedded(content, VIEW) if content else None,
-        long=LONG,
-        assets=assets(*scripts) if content or scripts or facts["validations"] else "",
-    )
-
-
-OVERVIEW = "Yaw-stability control: what papers say, and what comes out"
-"""Title of the overview."""
-
-
-def _answer_of_all(chapters: Sequence[dict[str, Any]]) -> str:
-    """Return in a sentence how many claims of all studies hold; "" without claims."""
-    counts: Counter[str] = Counter()
-    for facts in chapters:
-        counts.update(facts["counts"])
-    if not counts:
-        return ""
-    with_claims = [facts for facts in chapters if facts["counts"]]
-    alone = sum(not facts["region"] for facts in with_claims)
-    where = f", {'all' if alone == len(with_claims) else f'{alone} of the studies'} at the chosen point only"
-    return (
-        f"Of {sum(counts.values())} claims in {counted(len(with_claims), 'study', 'studies')}, "
-        f"{in_sentence(counts)}{where if alone else ''}."
-    )
-
-
-def overview_page(
-    chapters: Sequence[dict[str, Any]], pages: Sequence[str], folder: Path, ranking: str = ""
-) -> str:
-    """Return the page on several experiments; write side files with their runs.
-
-    Args:
-        chapters: of the experiments.
-        pages: their addresses.
-        folder: of the overview.
-        ranking: address of the ranking's page; "": there is none.
-    """
-    shown = {facts["id"]: facts["content"] for facts in chapters if facts["content"]}
-    for key, content in shown.items():
-        write_side(folder, key, content)
-    tidy_sides(folder, shown.keys())
-    return render(
-        "overview.html.j2", title=OVERVIEW, chapters=[*zip(chapters, pages, strict=True)], ranking=ranking,
-        answer=_answer_of_all(chapters), folder=DATA, first=next(iter(shown), ""), frame=embedded(None, VIEW),
-        assets=assets("chooser.js"),
-    )  # fmt: skip

@@ -10,13 +10,14 @@ import math
 import shlex
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
 from markupsafe import Markup
 
-from yawbench.figures.style import LabelledRun, digits_of, shown, shown_unit
+from yawbench.figures.display import LabelledRun, digits_of, shown, shown_unit
 from yawbench.foundation.errors import ResultsError
 from yawbench.foundation.messages import counted, listed
 from yawbench.metrics.expressions import metric
@@ -31,15 +32,28 @@ from yawbench.studies.experiment_result import Each, ExperimentResult
 from yawbench.studies.jobs import NOT_MADE, Job
 from yawbench.studies.limits import Limit, limits_of
 
-from .page_parts import option_of, render
+from .page_parts import Part, option_of, render
 from .viewer import DATA, METRICS, PANELS, Settings, View, carried, embedded, tidy_sides, write_side
 
+SWEEP_ASSETS = ("sweep.js", "sweep.css")
+"""Script and style sheet of the view."""
 KEY = 12
 """Characters of a run's key that name its file, as they name its folder."""
 DIGITS = 6
 """Significant digits of the numbers that the view carries; chosen: more than it shows."""
 MOST_METRICS = 8
 """Metrics in the table of an opened run."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SweepPart(Part):
+    """A view of a sweep: its anchor, data for the script, the viewer of a run, how runs ended."""
+
+    template = "sweep.html.j2"
+    name: str
+    data: dict[str, Any]
+    frame: Markup
+    counts: str
 
 
 def sweep_view(findings: ExperimentResult, name: str, sides: Mapping[int, str]) -> Markup:
@@ -50,11 +64,11 @@ def sweep_view(findings: ExperimentResult, name: str, sides: Mapping[int, str]) 
         name: its anchor.
         sides: number of a case -> key of its side file; see `write_sides`.
     """
-    text = render(
-        "sweep.html.j2", name=name, data=_data(findings, sides) | {"folder": DATA},
+    view = SweepPart(
+        name=name, data=_data(findings, sides) | {"folder": DATA},
         frame=embedded(None, f"{name}-run"), counts=status_counts(findings),
     )  # fmt: skip
-    return Markup(text)
+    return Markup(render(view))
 
 
 def status_counts(findings: ExperimentResult) -> str:

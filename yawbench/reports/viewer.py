@@ -1,20 +1,15 @@
 """Interactive viewer of runs: signals over time, differences, the road from above; part of a page, or a page.
 
-    {{ assets() }}              once per page: style and scripts
-    {{ viewer(runs) }}          once per viewer
-
-A page needs no server and no network. It carries every recorded sample (`viewer_data`); axes and zooming are
-those of uPlot, taken from the installed package `uplot-python`.
+`viewer` is a part of a page, `assets` are the page's style sheets and scripts. A page needs no server and no
+network. It carries every recorded sample (`viewer_data`); axes and zooming are those of uPlot, taken from the
+installed package `uplot-python`.
 """
 
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from importlib.metadata import distribution
-from importlib.resources import files
 from itertools import accumulate, pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -22,17 +17,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from markupsafe import Markup
 
+from yawbench.figures.display import LabelledRun, digits_apart, shown, shown_unit, unit_of_signal
 from yawbench.figures.plots import changes_of, spans_of
-from yawbench.figures.style import (
-    LINES,
-    MEASURED_LINE,
-    LabelledRun,
-    digits_apart,
-    line_style,
-    shown,
-    shown_unit,
-    unit_of_signal,
-)
+from yawbench.figures.style import LINES, MEASURED_LINE, line_style
 from yawbench.foundation.errors import ResultsError
 from yawbench.foundation.messages import listed
 from yawbench.foundation.safe_files import write_whole
@@ -43,7 +30,7 @@ from yawbench.orchestrator.results.reader import Results
 from yawbench.orchestrator.results.run_folder import RunStatus
 from yawbench.orchestrator.scenario.overrides import with_changes
 
-from .page_parts import document, render, static
+from .page_parts import Assets, Document, Part, render, static, without_comments
 from .road import legend_of, notes_of, road_of, without_tyres
 from .viewer_data import PackedRun, is_numeric, pack
 
@@ -51,6 +38,7 @@ SCRIPTS = (
     "viewer_data.js", "viewer_panels.js", "viewer_draw.js", "viewer_scene.js", "viewer_close_up.js",
     "viewer_road.js", "viewer.js", "viewer_side.js",
 )  # fmt: skip
+SHEETS = ("uPlot.min.css", "viewer.css")
 MOST = 200
 """Largest number of runs in one viewer. Chosen: beyond the runs of any study; colours repeat after seven."""
 FIRST = 14
@@ -145,10 +133,20 @@ class Carried(NamedTuple):
     blocks: Sequence[PackedRun]
 
 
+@dataclass(frozen=True, kw_only=True)
+class ViewerPart(Part):
+    """A viewer: its anchor, the description of its runs (None: a script fills it) and their samples."""
+
+    template = "viewer.html.j2"
+    name: str
+    data: dict[str, Any] | None
+    blocks: Sequence[PackedRun]
+
+
 def embedded(content: Carried | None, name: str, *, alone: bool = False) -> Markup:
     """Return a viewer as part of a page; without content, a script fills it with runs of side files."""
     data = content and content.data | {"alone": alone, "file": name}
-    return Markup(render("viewer.html.j2", name=name, data=data, blocks=content.blocks if content else []))
+    return Markup(render(ViewerPart(name=name, data=data, blocks=content.blocks if content else [])))
 
 
 DATA = "data"
@@ -245,26 +243,15 @@ def _sizes(packed: Sequence[PackedRun]) -> Iterator[int]:
     return accumulate(len(run.block) for run in packed)
 
 
-def assets(*scripts: str) -> Markup:
-    """Return the style and the scripts that all viewers of a page share, and further scripts of `static/`."""
-    foreign = Path(str(distribution("uplot-python").locate_file("uplot/static")))
-    plotter = (foreign / "uPlot.iife.js").read_text(encoding="utf-8")
-    styles = [(foreign / "uPlot.min.css").read_text(encoding="utf-8")]
-    sheets = ["viewer.css", *(name.replace(".js", ".css") for name in scripts)]
-    styles += [static(name) for name in sheets if (files(__package__) / "static" / name).is_file()]
-    script = without_comments("\n".join(map(static, (*SCRIPTS, *scripts))))
-    return Markup(
-        "<style>\n{}</style>\n<script>\n(() => {{\n'use strict';\n"
-        "const makeUPlot = (devicePixelRatio) => {{\n{}\nreturn uPlot;\n}};\n{}}})();\n</script>"
-    ).format(Markup("\n".join(styles)), Markup(without_comments(plotter)), Markup(script))
-
-
-def without_comments(script: str) -> str:
-    """Return a script without indentation and `//` comments: 15 kB less in every page.
-
-    Text over several lines would lose its indentation; a test holds that no script has any.
-    """
-    return re.sub(r"^[ \t]*(?://.*)?\n|^[ \t]+|[ \t]+//\s[^'\"`\n]*$", "", script, flags=re.MULTILINE)
+def assets(*names: str, package: str = __package__) -> Assets:
+    """Return what all viewers of a page share, and style sheets and scripts of `static/` of a package."""
+    scripts, sheets = ([name for name in names if name.endswith(kind)] for kind in (".js", ".css"))
+    plotter = f"const makeUPlot = (devicePixelRatio) => {{\n{static('uPlot.iife.js')}\nreturn uPlot;\n}};"
+    script = "\n".join([plotter, *map(static, SCRIPTS), *(static(name, package) for name in scripts)])
+    return Assets(
+        style="\n".join([*map(static, SHEETS), *(static(name, package) for name in sheets)]),
+        script=f"(() => {{\n'use strict';\n{without_comments(script)}}})();\n",
+    )
 
 
 def page(runs: Sequence[LabelledRun], settings: Settings = SETTINGS, *, title: str = "") -> str:
@@ -277,14 +264,15 @@ def page(runs: Sequence[LabelledRun], settings: Settings = SETTINGS, *, title: s
     """
     titles = list(dict.fromkeys(filter(None, (run.results.record.title for run in runs))))
     alone = with_changes(titles[0], runs[0].results.record.overrides) if titles and len(runs) == 1 else ""
-    return document(
-        title or alone or _title(runs),
+    view = Document(
+        title=title or alone or _title(runs),
         sentence=answer_of(runs),
         below="" if alone else "; ".join(titles),
         changed="" if alone and not title else changes_of(runs),
         viewer=viewer(runs, settings, name="run", alone=True),
         assets=assets(),
     )
+    return render(view)
 
 
 def _title(runs: Sequence[LabelledRun]) -> str:

@@ -1,12 +1,16 @@
 """Recorded signals as a page carries them: every sample, compressed, decoded by the browser.
 
-A run is one block of bytes: each column as first or second differences of integer codes over the range that
-all runs of the page share, in byte planes; compressed by gzip, in base64. Codes have 16 bits, or 24 where
-another run is so close that their difference would be rounding; zero has a code of its own. Columns with
-values that are not finite are 32-bit floats. Equal columns, such as both ends of a wire, share their bytes.
+There is one encoding, for times and signals: a sample is base + code step, and the codes of a column, 32-bit
+integers, are stored as second differences, zigzagged, the lowest bytes of all samples before the next ones. A
+run is one block of its columns' bytes; in a file it is compressed by gzip and written in base64. Negative
+codes stand for values that are not finite. Equal columns, such as both ends of a wire, share their bytes.
 Samples are never thinned in time. `static/viewer_data.js` is the other half.
 
-Sizes, paper A at 25 m/s, 4 runs of 216 columns and 8,001 rows: 0.65 MB; plain 32-bit floats take 9.2 MB.
+The step is a part of the range that all runs of the page share: `COARSE`, or `FINE` where another run is so
+close that their difference would be rounding, or `EXACT`. Zero has a code of its own.
+
+Sizes of the samples, paper A at 25 m/s, 4 runs of 64 columns and 8,001 rows: 0.48 MB. Without the order of
+the bytes 0.63 MB, without the differences 1.9 MB, as 32-bit floats 5.7 MB, all of them compressed.
 """
 
 from __future__ import annotations
@@ -14,39 +18,35 @@ from __future__ import annotations
 import base64
 import gzip
 import math
-import zlib
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
 from yawbench.metrics.expressions import while_moving
 from yawbench.orchestrator.results.reader import Results
 
-LEVELS = {2: 2**16 - 2, 3: 2**24 - 2}
-"""Bytes of a code -> steps over a range. A sample is off by at most half a step: 1/131068 of the range, or
-1/33554428."""
+COARSE, FINE, EXACT = 2**16 - 2, 2**24 - 2, 2**31 - 2
+"""Steps over a range. A sample is off by at most half a step: 1/131068 of the range, 1/33554428, and less
+than a 32-bit float of the size of the range."""
+NAN, MINUS, PLUS = -1, -2, -3
+"""Codes of values that are not finite: no number, minus and plus infinity."""
 LEVEL = 7
 """Compression level of gzip. Chosen: a third of the time of the highest one, for a hundredth more bytes."""
 CLOSE = 0.01
-"""Share of the range within which two runs count as close, and have the finer codes."""
+"""Share of the range within which two runs count as close, and have the finer steps."""
 
 
 @dataclass(frozen=True)
 class PackedColumn:
-    """A column: its form, what decodes it, and its byte planes (none for a constant).
+    """A column: a sample is base + code step; `data` has the codes."""
 
-    The forms are ("q", first, step, order, bytes): codes as differences of that order, a sample is
-    (first + code) step; ("f",): differences of the bits of 32-bit floats; ("r",): 32-bit floats as they are;
-    ("c", value): a constant; of times also ("d",): 64-bit floats, and ("u", begin, end): evenly spaced.
-    """
-
-    form: Literal["q", "f", "r", "c", "d", "u"]
-    numbers: tuple[float, ...] = ()
-    planes: bytes = b""
+    base: float
+    step: float
+    data: bytes
 
 
 @dataclass(frozen=True)
@@ -65,18 +65,13 @@ class PackedRun:
 
     @cached_property
     def _offsets(self) -> dict[bytes, int]:
-        """Byte planes -> their offset in the block; equal ones are stored once."""
-        offsets: dict[bytes, int] = {b"": 0}
-        size = 0
-        for column in (self.time, *self.columns.values()):
-            if column.planes not in offsets:
-                offsets[column.planes] = size
-                size += len(column.planes)
-        return offsets
+        """Bytes of a column -> their offset in the block; equal ones are stored once."""
+        different = dict.fromkeys(column.data for column in (self.time, *self.columns.values()))
+        return {data: 4 * self.rows * number for number, data in enumerate(different)}
 
     @property
     def data(self) -> bytes:
-        """All byte planes."""
+        """The bytes of all columns."""
         return b"".join(self._offsets)
 
     @cached_property
@@ -86,26 +81,25 @@ class PackedRun:
 
     @property
     def header(self) -> dict[str, Any]:
-        """Header from which the script decodes the block: of times and each column [form, offset, ...]."""
+        """Header from which the script decodes the block: of times and each column [offset, base, step]."""
 
-        def place(column: PackedColumn) -> list[Any]:
-            return [column.form, self._offsets[column.planes], *column.numbers]
+        def place(column: PackedColumn) -> list[float]:
+            return [self._offsets[column.data], column.base, column.step]
 
         columns = {name: place(column) for name, column in self.columns.items()}
         return {"rows": self.rows, "time": place(self.time), "columns": columns}
 
 
-def pack(runs: Sequence[Results], *, raw: bool = False) -> list[PackedRun]:
+def pack(runs: Sequence[Results], *, exact: bool = False) -> list[PackedRun]:
     """Pack all numeric columns of runs; angles of velocities are NaN while a car stands.
 
     Args:
         runs: those of one page.
-        raw: leave all columns 32-bit floats, for a page that gets the bytes from a server: nothing to
-            compress, and the page reads them at once.
+        exact: the finest steps for all columns, for a page that gets the bytes from a server, uncompressed.
     """
     runs = [*map(while_moving, runs)]
     ranges = _ranges(runs)
-    return [_packed(run, ranges, fine, raw) for run, fine in zip(runs, _close(runs, ranges), strict=True)]
+    return [_packed(run, ranges, fine, exact) for run, fine in zip(runs, _close(runs, ranges), strict=True)]
 
 
 def is_numeric(values: np.ndarray) -> bool:
@@ -151,64 +145,34 @@ def _close(runs: Sequence[Results], ranges: dict[str, tuple[float, float]]) -> l
     return close
 
 
-def _packed(run: Results, ranges: dict[str, tuple[float, float]], fine: set[str], raw: bool) -> PackedRun:
+def _packed(run: Results, ranges: dict[str, tuple[float, float]], fine: set[str], exact: bool) -> PackedRun:
     columns: dict[str, PackedColumn] = {}
     for name, values in run.columns.items():
         if not is_numeric(values):
             continue
-        low, high = ranges[name]
         values = np.asarray(values, float)
-        size = 3 if name in fine else 2
-        step = (high - low) / LEVELS[size]
-        if np.isfinite(values[:1]).all() and (values == values[:1]).all():
-            columns[name] = PackedColumn("c", (float(values[0]),))
-        elif raw:
-            columns[name] = PackedColumn("r", (), values.astype("<f4").tobytes())
-        elif not (0.0 < step < np.inf and np.isfinite(values).all()):
-            columns[name] = PackedColumn("f", (), _float_planes(values))
-        else:
-            first = math.floor(low / step)
-            order, planes = _code_planes(np.rint(values / step) - first, size)
-            columns[name] = PackedColumn("q", (first, step, order, size), planes)
-    return PackedRun(run.time.size, _packed_time(run.time), columns)
+        low, high = ranges[name]
+        finest = exact or not np.isfinite(values).all()
+        levels = EXACT if finest else FINE if name in fine else COARSE
+        step = high / levels - low / levels if low < high else 0.0
+        base = math.floor(low / step) * step if step else low if low == high else 0.0
+        columns[name] = _column(values, base, step)
+    return PackedRun(run.time.size, _time(run.time), columns)
 
 
-def _packed_time(time: np.ndarray) -> PackedColumn:
-    """Return evenly spaced times as their ends, others as 64-bit floats."""
-    if time.size > 1:
-        even = np.linspace(time[0], time[-1], time.size)
-        if np.allclose(time, even, rtol=0.0, atol=1e-9):
-            return PackedColumn("u", (float(time[0]), float(time[-1])))
-    raw = np.ascontiguousarray(time, "<f8").view(np.uint8).reshape(-1, 8)
-    return PackedColumn("d", (), raw.T.tobytes())
+def _time(time: np.ndarray) -> PackedColumn:
+    """Return times: those that are evenly spaced have this step."""
+    begin, end = float(time[0]), float(time[-1])
+    rows = time.size
+    even = rows > 1 and np.allclose(time, np.linspace(begin, end, rows), rtol=0.0, atol=1e-9)
+    return _column(time, begin, (end - begin) / (rows - 1 if even else EXACT))
 
 
-def _code_planes(codes: np.ndarray, size: int) -> tuple[int, bytes]:
-    """Return the order of differences that compresses best, and the zigzagged differences in byte planes.
-
-    Args:
-        codes: integers from 0 below 256**size.
-        size: bytes of a code. Differences are modulo 256**size; the lowest bytes come first.
-    """
-    best: tuple[int, int, bytes] | None = None
-    bits = 8 * size
-    steps = codes.astype(np.int64)
-    for order in (1, 2):
-        steps = np.diff(steps, prepend=0)
-        signed = ((steps + (1 << (bits - 1))) & ((1 << bits) - 1)) - (1 << (bits - 1))
-        folded = ((signed << 1) ^ (signed >> 63)).astype("<u4")
-        planes = folded.view(np.uint8).reshape(-1, 4)[:, :size].T.tobytes()
-        packed = len(zlib.compress(planes, 1))
-        if best is None or packed < best[0]:
-            best = packed, order, planes
-    assert best is not None
-    return best[1:]
-
-
-def _float_planes(values: np.ndarray) -> bytes:
-    """Return the differences of the bits of 32-bit floats, in four byte planes."""
-    with np.errstate(over="ignore"):
-        bits = np.ascontiguousarray(values, "<f4").view("<u4").astype(np.int64)
-    steps = (np.diff(bits, prepend=0) & 0xFFFFFFFF).astype("<u4")
-    planes: np.ndarray = steps.view(np.uint8).reshape(-1, 4).T
-    return planes.tobytes()
+def _column(values: np.ndarray, base: float, step: float) -> PackedColumn:
+    """Return the codes of values."""
+    finite = np.isfinite(values)
+    codes = np.where(values > 0, PLUS, np.where(values < 0, MINUS, NAN)).astype("<i4")
+    codes[finite] = np.clip(np.rint((values[finite] - base) / step), 0, EXACT + 1) if step else 0
+    steps = np.diff(codes, 2, prepend=np.zeros(2, codes.dtype))  # modulo 2^32
+    folded = (steps << 1) ^ (steps >> 31)
+    return PackedColumn(base, step, folded.view(np.uint8).reshape(-1, 4).T.tobytes())

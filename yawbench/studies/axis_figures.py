@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from yawbench.figures.style import QUIET, line_style, literal, shown, shown_unit
+from yawbench.figures.display import shown, shown_unit
+from yawbench.figures.style import QUIET, line_style, literal
 from yawbench.foundation.errors import ResultsError
 from yawbench.metrics.expressions import MetricValue, metric
 from yawbench.metrics.measures import variable_of, words

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from yawbench.figures.style import digits_of
+from yawbench.figures.display import digits_of
 from yawbench.metrics.verdict import Status, Verdict, not_judged
 
 from .axes import RUN, Level

@@ -9,7 +9,7 @@ import itertools
 import math
 from dataclasses import dataclass
 
-from yawbench.figures.style import digits_of
+from yawbench.figures.display import digits_of
 from yawbench.metrics.verdict import Verdict
 
 from .confidence import Bounds, Decision, SequentialTest

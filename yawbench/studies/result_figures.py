@@ -9,8 +9,9 @@ from pathlib import Path
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any
 
+from yawbench.figures.display import LabelledRun
 from yawbench.figures.plots import draw
-from yawbench.figures.style import ROW, LabelledRun, frame, literal, new_figure, save
+from yawbench.figures.style import ROW, frame, literal, new_figure, save
 from yawbench.foundation.errors import ResultsError
 from yawbench.foundation.messages import counted
 from yawbench.orchestrator.scenario.overrides import changed

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
-from yawbench.figures.style import DIGITS, digits_apart, digits_of, shown
+from yawbench.figures.display import DIGITS, digits_apart, digits_of, shown
 from yawbench.foundation.messages import counted
 from yawbench.metrics.expressions import MetricValue, metric
 from yawbench.metrics.verdict import Status, Verdict, VerdictText, worded

@@ -35,7 +35,7 @@ class Section:
         compare: returns findings on the runs that have results, from these and what was loaded; a finding has
             `as_data()` for the record of the study.
         table: returns the table of a finding.
-        facts: returns the template data of a finding, from it and the anchor of its viewer.
+        view: returns what a page shows of a finding, from it and the anchor of its viewer.
     """
 
     entry: type[StrictModel]
@@ -43,7 +43,7 @@ class Section:
     load: Callable[[Sequence[Any], Path], Any]
     compare: Callable[[Mapping[str, Results], Any], list[Any]]
     table: Callable[[Any], Table]
-    facts: Callable[[Any, str], dict[str, Any]]
+    view: Callable[[Any, str], Any]
 
 
 @cache

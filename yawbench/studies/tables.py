@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from itertools import chain, zip_longest
 from typing import TYPE_CHECKING, Any, Literal
 
-from yawbench.figures.style import shown
+from yawbench.figures.display import shown
 from yawbench.foundation.errors import text_of
 from yawbench.foundation.messages import printable
 from yawbench.metrics.expressions import (

@@ -236,7 +236,8 @@ def history_figure(experiment: LoadedExperiment, tuned_laws: Sequence[TunedLaw],
     """Draw the smallest objective so far over the number of trials, a line per law."""
     from matplotlib.lines import Line2D
 
-    from yawbench.figures.style import frame, line_style, new_figure, shown_unit
+    from yawbench.figures.display import shown_unit
+    from yawbench.figures.style import frame, line_style, new_figure
 
     with new_figure() as figure:
         axes = figure.subplots()

@@ -13,10 +13,9 @@ const escaped = (text) => String(text).replace(/[&<>"]/g, (one) => `&#${one.char
 const signed = (text) => text.replace('-', '−');
 
 class Sweep extends InAddress {
-  constructor(root) {
+  constructor(root, data) {
     super();
-    Object.assign(this, {root, key: root.id, find: (name) => root.querySelector('.ys-' + name)});
-    const data = this.data = JSON.parse(root.querySelector(':scope > script').textContent);
+    Object.assign(this, {root, data, key: root.id, find: (name) => root.querySelector('.ys-' + name)});
     this.count = data.status.length;
     this.rows = [...Array(this.count).keys()];
     this.dims = [
@@ -602,8 +601,8 @@ function wrapped(text, width, most) {
   return lines.map((line) => (line.length > width + 2 ? `${line.slice(0, width)}…` : line));
 }
 
-function startSweeps() {
-  for (const root of document.querySelectorAll('.ys:not(.ys-ready)')) root.sweep = new Sweep(root);
+async function startSweeps() {
+  for (const root of document.querySelectorAll('.ys')) root.sweep = new Sweep(root, JSON.parse(await unpacked(root.querySelector(':scope > script'))));
 }
 
 ready(startSweeps);

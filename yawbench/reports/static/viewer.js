@@ -271,8 +271,7 @@ class Viewer extends InAddress {
 
   // See `Run.grain`.
   grain(run, name) {
-    if (!this.state.difference || run === this.baseline) return run.grain(name);
-    return run.rounding(name) + this.baseline.rounding(name);
+    return run.grain(name) + (this.state.difference && run !== this.baseline ? this.baseline.grain(name) : 0);
   }
 
   // The signals of a text of the reader, by name, by variable, by label or by a part of one, as a panel names them.
@@ -679,7 +678,7 @@ let bytesOf = (block) => inflate(block.textContent); // a served page has its ow
 
 async function startViewer(root) {
   root.classList.add('yv-started');
-  const data = JSON.parse(root.querySelector('script[type="application/json"]').textContent);
+  const data = JSON.parse(await unpacked(root.querySelector('script[type="application/json"]')));
   return fillViewer(root, data, [...root.querySelectorAll('script[type="text/plain"]')].map((block) => bytesOf(block)));
 }
 

@@ -15,43 +15,18 @@ function made(tag, content = '', properties = {}) {
 
 const WHEELS = ['fl', 'fr', 'rl', 'rr'];
 
-async function inflate(text) {
-  const raw = atob(text);
-  const bytes = new Uint8Array(raw.length);
-  for (let i = 0; i < raw.length; i++) bytes[i] = raw.charCodeAt(i);
-  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream('gzip'));
-  return new Uint8Array(await new Response(stream).arrayBuffer());
-}
+const NOT_FINITE = [NaN, -Infinity, Infinity];
 
-function decodeTime([form, first, begin, end], rows, bytes) {
-  if (form === 'u') return new Float64Array(rows).map((_, i) => begin + ((end - begin) * i) / (rows - 1));
-  const raw = new Uint8Array(8 * rows);
-  for (let i = 0; i < rows; i++) for (let k = 0; k < 8; k++) raw[8 * i + k] = bytes[first + k * rows + i];
-  return new Float64Array(raw.buffer);
-}
-
-function decodeColumn([form, offset, first, step, order, size], rows, bytes) {
+function decoded([offset, base, step], rows, bytes) {
   const values = new Float64Array(rows);
-  if (form === 'c') return values.fill(first);
-  if (form === 'q') {
-    const mask = size === 3 ? 0xffffff : 0xffff;
-    for (let i = 0, code = 0, slope = 0; i < rows; i++) {
-      let folded = bytes[offset + i] | (bytes[offset + rows + i] << 8);
-      if (size === 3) folded |= bytes[offset + 2 * rows + i] << 16;
-      const change = (folded >>> 1) ^ -(folded & 1);
-      slope = order === 2 ? (slope + change) & mask : change;
-      code = (code + slope) & mask;
-      values[i] = (first + code) * step;
-    }
-    return values;
+  for (let i = 0, code = 0, slope = 0; i < rows; i++) {
+    let folded = 0;
+    for (let k = 0; k < 4; k++) folded |= bytes[offset + k * rows + i] << (8 * k);
+    slope = (slope + ((folded >>> 1) ^ -(folded & 1))) | 0;
+    code = (code + slope) | 0;
+    values[i] = code < 0 ? NOT_FINITE[-1 - code] : base + code * step;
   }
-  if (form === 'r') return new Float64Array(new Float32Array(bytes.slice(offset, offset + 4 * rows).buffer));
-  const bits = new Int32Array(rows);
-  for (let i = 0, sum = 0; i < rows; i++) {
-    for (let k = 0; k < 4; k++) sum = (sum + (bytes[offset + k * rows + i] << (8 * k))) | 0;
-    bits[i] = sum;
-  }
-  return new Float64Array(new Float32Array(bits.buffer));
+  return values;
 }
 
 // Index of the last row at or before t, and the way from there to the next row, 0 to 1.
@@ -71,7 +46,7 @@ class Run {
   constructor(described, bytes, number) {
     Object.assign(this, described, {number});
     this.bytes = bytes;
-    this.time = decodeTime(described.time, described.rows, bytes);
+    this.time = decoded(described.time, described.rows, bytes);
     this.start = this.time[0];
     this.end = this.time[this.time.length - 1];
     this.decoded = new Map();
@@ -87,22 +62,13 @@ class Run {
 
   decode(name) {
     const [one, other] = name.split(' - ');
-    if (other === undefined) return decodeColumn(this.columns[name], this.rows, this.bytes);
+    if (other === undefined) return decoded(this.columns[name], this.rows, this.bytes);
     const from = this.column(other);
     return this.column(one).map((value, i) => value - from[i]);
   }
 
-  // Values of a signal that lie closer to each other than this mean the same: the step of its codes; 0: the page has
-  // all digits.
-  grain(name) { return name.includes(' - ') ? this.rounding(name) : this.columns[name][0] === 'q' ? this.columns[name][3] : 0; }
-
-  // The same of what is subtracted from another signal, whose rounding stays.
-  rounding(name) {
-    return name.split(' - ').map((part) => {
-      const [form, , , step] = this.columns[part];
-      return form === 'q' ? step : FLOAT * Math.max(...extremes(this.column(part)).map(Math.abs));
-    }).reduce((one, other) => one + other);
-  }
+  // Values of a signal that lie closer to each other than this mean the same: the steps of their codes.
+  grain(name) { return name.split(' - ').reduce((sum, part) => sum + this.columns[part][2], 0); }
 
   // The recorded value at t, of the nearest row; NaN where the run has none.
   at(name, t) {
@@ -131,8 +97,6 @@ class Run {
   }
 }
 
-const FLOAT = 2 ** -23; // between two neighbouring 32-bit floats, relative to them
-
 // Values of a run at the times of another run, straight between rows, NaN outside.
 function resampled(values, time, wanted) {
   if (time.length === wanted.length && time[0] === wanted[0] && time[time.length - 1] === wanted[wanted.length - 1]) return values;
@@ -152,7 +116,7 @@ function extremes(values, from = [Infinity, -Infinity]) {
   return [low, high];
 }
 
-// A number with some significant digits, as `figures/style.digits_of` writes it.
+// A number with some significant digits, as `figures/display.digits_of` writes it.
 function digitsOf(value, digits) {
   if (Number.isNaN(value)) return 'no number';
   if (!Number.isFinite(value)) return value > 0 ? 'never' : '-∞';
