@@ -1,4 +1,4 @@
-"""FMUs that do harm: a sample of `tests.trials.hostile_fmus`, and what comes through the pipe of one."""
+"""FMUs that do harm: a sample of `campaigns.hostile_fmus`, and what comes through the pipe of one."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ import sys
 import numpy as np
 import pytest
 
+from campaigns.hostile_fmus import VALUES_OF, Case, attack, make_files
 from tests.refusals import mentions
 from yawbench.foundation import supervised_process
 from yawbench.foundation.fork_server import Child
@@ -21,8 +22,6 @@ from yawbench.orchestrator.master import isolation
 from yawbench.orchestrator.master.isolation import InstanceProcess
 from yawbench.orchestrator.master.process_state import Log
 from yawbench.orchestrator.results.reader import load_results
-
-from ..trials.hostile_fmus import VALUES_OF, Case, attack, make_files
 
 pytestmark = [
     pytest.mark.skipif(sys.platform != "linux", reason="compiles for Linux"),

@@ -1,4 +1,4 @@
-"""Values altered in files of users and in records, a sample; `python -m tests.trials.altered` tries more."""
+"""Values altered in files of users and in records, a sample; `python -m campaigns.altered` tries more."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from .altered import GROUPS, Folder, base, trial
-from .full_disk import trial as on_a_full_disk
-from .kills import COMMANDS, UNITS, build_all
+from campaigns.altered import GROUPS, Folder, base, trial
+from campaigns.full_disk import trial as on_a_full_disk
+from campaigns.kills import COMMANDS, UNITS, build_all
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="forks, and limits the child")
 

@@ -1,4 +1,4 @@
-"""Files made wrong at random, a sample; `python -m tests.trials.mutations` tries more of them."""
+"""Files made wrong at random, a sample; `python -m campaigns.mutations` tries more of them."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from .mutations import LIMIT, UNFORESEEN, bad, trial
+from campaigns.mutations import LIMIT, UNFORESEEN, bad, trial
 
 SAMPLE = {"files": range(50), "ssp": range(10), "results": range(10), "commands": range(3)}
 

@@ -11,13 +11,12 @@ from collections.abc import Callable, Sequence
 
 import pytest
 
+from campaigns import random_calls
+from campaigns.fmi_calls import Call, Host, Save, Step
+from campaigns.random_calls import DEAD, DIFFERENT, SAME, SLOW, Tally, trial
 from yawbench.fmus.archive import runs_as
 from yawbench.fmus.build import HERE as FMUS
 from yawbench.fmus.build import build_all
-
-from . import random_calls
-from .fmi_calls import Call, Host, Save, Step
-from .random_calls import DEAD, DIFFERENT, SAME, SLOW, Tally, trial
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="needs processes that fork")
 SMALL = ("controller_pid", "wheel_control_slip")

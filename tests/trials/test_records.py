@@ -1,4 +1,4 @@
-"""Records and journals with altered lines, a sample; `python -m tests.trials.records` alters more."""
+"""Records and journals with altered lines, a sample; `python -m campaigns.records` alters more."""
 
 from __future__ import annotations
 
@@ -6,10 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from campaigns.records import KINDS, trial
 from tests.orchestrator.test_batch_commands import UNITS
 from yawbench.fmus.build import build_all
-
-from .records import KINDS, trial
 
 
 def _none_wrong(counts: dict[str, int], seed: int, place: Path) -> None:

@@ -1,4 +1,4 @@
-"""Folders of results from somebody else; `python -m tests.trials.result_folders` reads more of them."""
+"""Folders of results from somebody else; `python -m campaigns.result_folders` reads more of them."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from .result_folders import cases, trial
+from campaigns.result_folders import cases, trial
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="needs links and pipes")
 

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import pytest
 
-from . import classes
-from .class_programs import program as program_of_classes
-from .random_programs import FUNCTION, KINDS, OBJECT, program
-from .translated import REFUSED, SAME, kind_of, trial, tried
+from campaigns import classes
+from campaigns.class_programs import program as program_of_classes
+from campaigns.random_programs import FUNCTION, KINDS, OBJECT, program
+from campaigns.translated import REFUSED, SAME, kind_of, trial, tried
 
 FEW = (1, 9, 17, 34)
 """Seeds of programs of all kinds that are translated, not refused."""

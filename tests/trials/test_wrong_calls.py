@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from .wrong_calls import TAKEN, Tally, cases, described, trial
+from campaigns.wrong_calls import TAKEN, Tally, cases, described, trial
 
 EACH = 113
 """Calls of which the sample makes one. Chosen: a prime, so that each parameter meets other values."""

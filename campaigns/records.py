@@ -1,4 +1,4 @@
-"""Records and journals with altered lines and keys: `python -m tests.trials.records --each 150 --seed 1`.
+"""Records and journals with altered lines and keys: `python -m campaigns.records --each 150 --seed 1`.
 
 A study and a sweep are made once; then a line, key or value of one of their files, or of a ranking's file of
 entries, is altered, and a command called that prints numbers from it. It holds if the table is the same as
