@@ -253,14 +253,16 @@ def _mutant(checkout: Path, module: str, draw: random.Random) -> dict[str, Any] 
     code = (checkout / module).read_text(encoding="utf-8")
     nodes = list(ast_nodes(get_ast(code)))
     places: dict[tuple[int, int], list[tuple[str, int]]] = defaultdict(list)
+    alike: dict[str, list[tuple[int, int]]] = {}  # operators that replace the same are where it is
     for name in sorted(operator_names()):
         if not name.startswith("core/") or "Variable" in name or "NoOp" in name:
             continue
-        occurrence = 0
-        for node in nodes:
-            for start, _ in get_operator(name)().mutation_positions(node):
-                places[start].append((name, occurrence))
-                occurrence += 1
+        replaced = name.rpartition("_")[0] or name
+        if replaced not in alike:
+            operator = get_operator(name)()
+            alike[replaced] = [start for node in nodes for start, _ in operator.mutation_positions(node)]
+        for occurrence, start in enumerate(alike[replaced]):
+            places[start].append((name, occurrence))
     if not places:
         return None
     (line, _), choices = draw.choice(sorted(places.items()))

@@ -16,7 +16,6 @@ import pytest
 
 from tests.commands import status_of
 from tests.refusals import mentions
-from yawbench.figures.style import shown
 from yawbench.foundation.errors import Diagnostic, RecordWarning
 from yawbench.ranking.ranking import EntrySpec, load_ranking
 from yawbench.ranking.ranking_scores import (
@@ -26,7 +25,6 @@ from yawbench.ranking.ranking_scores import (
     RankedRun,
     RankedState,
     RankingCell,
-    deciding_digits,
     placed,
     told_apart,
 )
@@ -111,24 +109,6 @@ def test_entries_whose_intervals_overlap_share_a_place_and_those_far_apart_do_no
     assert abs(nine.low - draws.ppf(0.025)) <= 1 and abs(nine.high - draws.ppf(0.975)) <= 1
     apart, pairs = told_apart(ranked)
     assert (apart, pairs) == (4, 6)  # neither nine and eight nor one and none
-
-
-def test_numbers_that_decide_places_read_differently():
-    close = [
-        standing("first", *2 * [[driven(sideslip=0.300001)]]),
-        standing("second", *2 * [[driven(sideslip=0.300004)]]),
-        standing("bad", [driven(stability=0.0, sideslip=0.300004)] + [driven()] * 999, [driven()]),
-        standing("worse", [driven(stability=0.0, sideslip=0.3)] * 2 + [driven()] * 998, [driven()]),
-    ]
-    ranked = placed(close)
-    digits = deciding_digits(ranked)
-    slips = [shown(one.mean("sideslip"), "rad", digits=digits.sideslip) for one in ranked]
-    shares = [shown(one.share, "%", digits=digits.share) for one in ranked]
-    known = {one.entry: k for k, one in enumerate(ranked)}
-    assert len({slips[known[name]] for name in ("first", "second")}) == 2
-    assert len({shares[known[name]] for name in ("bad", "worse")}) == 2
-    far = placed([standing(name, [driven(sideslip=x)]) for name, x in (("a", 0.2), ("b", 0.3))])
-    assert deciding_digits(far) == (2, 3)
 
 
 def test_an_entry_without_a_run_is_missing_and_has_no_place():
@@ -302,19 +282,3 @@ def test_shipped_entries_are_as_they_were_found(tmp_path):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert edited_ranking(tmp_path).edited == ()
-
-
-def test_the_ranking_of_the_proving_ground_is_as_large_as_it_says():
-    ranking = load_ranking(GROUND / "ranking.yaml")
-    assert len(ranking.spec.entries) >= 11
-    assert len(ranking.conditions) >= 12
-    quick = load_ranking(GROUND / "ranking.yaml", quick=True)
-    assert 1 < len(quick.conditions) < len(ranking.conditions)
-
-
-@pytest.mark.parametrize("name", load_ranking(GROUND / "ranking.yaml").spec.conditions)
-def test_brakes_get_no_help_from_a_drive_without_lag(name):
-    """Whoever brakes by hydraulics has an allocator that never drives a wheel."""
-    ranking = load_ranking(GROUND / "ranking.yaml")
-    text = (GROUND / ranking.spec.conditions[name].scenario).read_text()
-    assert ("wheel_control_hydraulic" in text) != ("allocator_load_proportional" in text)

@@ -9,13 +9,11 @@ import pytest
 
 from tests.checkout import ROOT
 from tests.evidence import RECORD
-from tests.refusals import sentence_has
 from tests.studies import judge_all
-from tests.verdicts import FILE, KINDS, page, recorded, rows_of, studies, summary, table_in
+from tests.verdicts import FILE, page, recorded, rows_of, studies
 from yawbench.orchestrator.results.run_folder import default_folder
 from yawbench.studies.journal import FILE as JOURNAL
 from yawbench.studies.load_experiment import load_experiment
-from yawbench.studies.result_tables import FAILS, HOLDS
 
 FILES = (
     "fnn_sideslip/study", "fuzzy_sliding_mode/study", "fuzzy_sliding_mode/distribution", "fuzzy_pid/study",
@@ -47,36 +45,3 @@ def test_the_page_has_every_claim_of_every_study_and_sums_them_up():
     for title, study in studies().items():
         assert [row.says for row in found[title]] == [one.says for one in study.spec.claims]
     assert FILE.read_text(encoding="utf-8") == page(found)
-
-
-def test_the_page_on_papers_tells_of_verdicts_what_the_page_does():
-    section = (
-        (ROOT / "docs" / "papers.md").read_text(encoding="utf-8").partition("## How far the verdicts")[2]
-    )
-    told = table_in(section.partition("\n##")[0])
-    found = {title.partition(":")[0]: rows for title, rows in recorded().items()}
-    assert [tuple(row) for row in told[1 : 1 + len(found)]] == summary(found)
-    decided = [
-        [paper.removeprefix("Paper "), *row]
-        for paper, rows in found.items()
-        for row in rows
-        if row.verdict in (HOLDS, FAILS["claims"])
-    ]
-    assert told[2 + len(found) :] == decided
-    counts = [sum(int(row[k]) for row in summary(found)) for k in range(2, 2 + len(KINDS))]
-    words = "{} hold, {} do not reproduce, {} depend on these values, {} are undecided".format(*counts)
-    assert words in " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
-    total = sum(map(len, found.values()))
-    assert sentence_has(section, "Most", "claims", "values")
-    assert total - len(decided) > total / 2
-
-
-def test_the_page_on_papers_tells_how_far_the_best_of_26_carries():
-    title = next(title for title in recorded() if "table 3" in title)
-    (best,) = (
-        row for row in recorded()[title] if row.says.endswith("the one in proportion to load is the best.")
-    )
-    section = (ROOT / "docs" / "papers.md").read_text(encoding="utf-8").partition("## Paper B")[2]
-    told = " ".join(section.partition("\n## ")[0].split())
-    assert sentence_has(told, best.margin, "best")
-    assert sentence_has(told, best.verdict, best.region, best.flip)
