@@ -9,12 +9,11 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from matplotlib.figure import Figure
 
 from tests.changed import changed
 from tests.refusals import each_mentions, refused
 from yawbench.commands.results import distinct
-from yawbench.figures.plots import LabelledRun, shown_by
+from yawbench.figures.plots import LabelledRun
 from yawbench.figures.style import save
 from yawbench.foundation.errors import Diagnostic, ScenarioError
 from yawbench.metrics.expressions import MetricValue
@@ -226,22 +225,6 @@ def stars(*values: tuple[float, ...]) -> list[list[int]]:
 )
 def test_the_best_is_marked_where_it_reads_better_and_doing_nothing_wins_no_effort(values, expected):
     assert stars(*values) == expected
-
-
-def test_no_run_leaves_the_axes_of_the_signals_that_differ_most(tmp_path):
-    lost = [
-        LabelledRun(name, car(gain)) for name, gain in (("a", 1.0), ("b", 40.0), ("c", 50.0), ("d", 60.0))
-    ]
-    for whole in (True, False):
-        (panel,) = shown_by(lost, ["sideslip"], whole=whole)
-        axes = Figure().add_subplot()
-        panel.draw(axes)
-        _, high = axes.get_ylim()
-        assert high >= max(line.get_ydata().max() for line in axes.get_lines()), whole
-    (panel,) = shown_by(lost[:2] + lost[:1], ["sideslip"])
-    axes = Figure().add_subplot()
-    panel.draw(axes)
-    assert axes.get_ylim()[1] < max(line.get_ydata().max() for line in axes.get_lines())  # one of three may
 
 
 def test_a_comparison_without_any_result_still_writes_its_tables(findings, tmp_path):

@@ -114,17 +114,6 @@ def test_the_csv_has_plain_numbers_in_si(tmp_path):
     assert float(rows[0]["order [1]"]) == pytest.approx(2.0)
 
 
-def test_the_figure_shows_error_over_step_and_over_cost(tmp_path):
-    rows = measure(made(tmp_path, {"extrapolated": 2, "jacobi": 1}), SIGNAL)
-    figure = convergence_figure(rows, SIGNAL, "title", "note")
-    by_step, by_cost = figure.axes
-    assert [axes.get_xscale() + axes.get_yscale() for axes in figure.axes] == ["loglog", "loglog"]
-    assert by_step.get_lines()[0].get_xdata() == pytest.approx([40, 20, 10])
-    assert by_cost.get_lines()[1].get_xdata() == pytest.approx([1, 2, 4, 8])
-    assert [text.get_text() for text in by_step.texts] == ["order 1", "order 2"]
-    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["extrapolated", "jacobi"]
-
-
 def test_runs_that_do_not_differ_cannot_be_drawn(tmp_path):
     rows = measure(made(tmp_path, {"extrapolated": 2}, scale=0.0), SIGNAL)
     with refused(ResultsError, "nothing-to-draw"):

@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
-import re
 import shutil
-import subprocess
-import sys
 import warnings
 from math import radians
 from pathlib import Path
@@ -195,23 +192,6 @@ def test_a_small_matrix_is_driven_goes_on_where_it_was_and_shows_what_is_missing
     places = {entry["entry"]: entry["place"] for entry in answer["entries"]}
     assert places == {"fuzzy_pid": 1, "none": 2}
     assert (answer["page"], answer["folder"]) == (str(out / "report.html"), str(out))
-
-
-@pytest.mark.exhaustive
-def test_a_ranking_that_was_killed_goes_on_where_it_was(tmp_path, capsys):
-    file, out = tmp_path / "small.yaml", tmp_path / "out"
-    file.write_text(SMALL)
-    program = "import sys; from yawbench.cli import main; main(sys.argv[1:])"
-    command = [sys.executable, "-c", program, "rank", str(file), "--out", str(out), "--jobs", "1"]
-    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, cwd=ROOT) as process:
-        assert process.stderr is not None
-        next(line for line in process.stderr if line.startswith("[1/4]"))
-        process.kill()
-    assert not (out / "table.csv").exists()
-    assert status_of("rank", file, "--out", out) == 0
-    told = capsys.readouterr().err
-    assert re.search(r"small: 4 runs, [123] finished already", told), told
-    assert [one["missing"] for one in rows(out / "table.csv")] == ["0", "0"]
 
 
 @pytest.mark.exhaustive
