@@ -48,7 +48,8 @@ STAGES = ((8, 12.0), (25, 45.0))
 """Most files, and most seconds of their tests as recorded, of each round with a mutant. Chosen: minutes."""
 SLOWER = 4.0
 """Seconds that tests may take for each recorded one, after `AT_LEAST`. Chosen: other work goes on."""
-AT_LEAST = 60.0
+AT_LEAST, WHOLE = 60.0, 15.0
+TOO_SLOW = "too slow"
 MEMORY = 8 << 30
 """Limit of a trial's memory [bytes]."""
 LIBRARIES = (
@@ -310,7 +311,7 @@ def _statement(code: str, line: int) -> tuple[int, int]:
 # -- trials
 
 
-def run_tests(checkout: Path, tests: Sequence[str], seconds: float) -> str:
+def run_tests(checkout: Path, tests: Sequence[str], seconds: float, without: Sequence[str] = ()) -> str:
     """Run tests of a checkout in a copy of this process; return the first that failed, or nothing."""
     reading, writing = os.pipe()
     child = os.fork()
@@ -326,7 +327,8 @@ def run_tests(checkout: Path, tests: Sequence[str], seconds: float) -> str:
         sys.path.insert(0, str(checkout))
         first = _First()
         try:
-            options = ["-x", "-q", "-p", "no:cacheprovider"]
+            options = ["-x", "-q", "-p", "no:cacheprovider", "-m", "not exhaustive"]
+            options += [f"--deselect={test}" for test in without]
             status = int(pytest.main([*options, *tests], plugins=[first]))
         except BaseException:
             status = 3
@@ -346,7 +348,7 @@ def run_tests(checkout: Path, tests: Sequence[str], seconds: float) -> str:
     if not answered:
         os.killpg(child, signal.SIGKILL)
         os.waitpid(child, 0)
-        return "too slow"
+        return TOO_SLOW
     return told
 
 
@@ -369,9 +371,11 @@ def existing(checkout: Path, tests: Iterable[str]) -> list[str]:
     kept = []
     for test in tests:
         file, _, name = test.partition("::")
+        if not name and (checkout / file).exists():
+            kept.append(test)
         function = name.partition("[")[0].split("::")[-1]
         text = (checkout / file).read_text(encoding="utf-8") if (checkout / file).exists() else ""
-        if f"def {function}(" in text:
+        if name and f"def {function}(" in text:
             kept.append(test)
     return kept
 
@@ -395,14 +399,15 @@ class Trials:
         if first:
             rounds.insert(0, existing(self.checkout, [first]))
         for tests in filter(None, rounds):
-            while tests:
+            failing = []  # without a mutant, too
+            while True:
                 with self.mutated(mutant):
-                    failed = self.run(tests)
+                    failed = self.run(tests, failing)
                 if not failed:
                     break
-                if failed not in tests or self.passing(failed):
+                if failed == TOO_SLOW or "::" not in failed or self.passing(failed):
                     return failed
-                tests = tests[tests.index(failed) + 1 :]  # it fails without the mutant too
+                failing.append(failed)
         return ""
 
     def passing(self, test: str) -> bool:
@@ -411,9 +416,9 @@ class Trials:
             self.passes[test] = not self.run([test])
         return self.passes[test]
 
-    def run(self, tests: Sequence[str]) -> str:
-        seconds = AT_LEAST + SLOWER * sum(self.took.get(test, 1.0) for test in tests)
-        return run_tests(self.checkout, tests, seconds)
+    def run(self, tests: Sequence[str], without: Sequence[str] = ()) -> str:
+        known = sum(self.took.get(test, WHOLE if "::" not in test else 1.0) for test in tests)
+        return run_tests(self.checkout, tests, AT_LEAST + SLOWER * known, without)
 
     @contextlib.contextmanager
     def mutated(self, mutant: dict[str, Any]) -> Iterator[None]:
@@ -441,6 +446,7 @@ def try_all(checkout: Path, mutants: Path, out: Path, killed_in: Path | None) ->
         with contextlib.suppress(ImportError):
             importlib.import_module(library)
     os.environ |= AS_RECORDED
+    sys.dont_write_bytecode = True
     trials = Trials(checkout, drawn["took"])
     for number, mutant in enumerate(drawn["mutants"]):
         key = str(number)

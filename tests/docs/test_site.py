@@ -43,6 +43,7 @@ def text_of(site, name):
     return (site / name).read_text("utf-8")
 
 
+@pytest.mark.exhaustive  # test_links.py looks at the pages as they are written
 def test_every_page_of_the_docs_is_in_the_menu_and_built(site, pages):
     written = {file.relative_to(ROOT / "docs") for file in (ROOT / "docs").rglob("*.md")}
     assert len(written) > 10
@@ -50,6 +51,7 @@ def test_every_page_of_the_docs_is_in_the_menu_and_built(site, pages):
     assert not list(site.rglob("*.py"))
 
 
+@pytest.mark.exhaustive  # test_links.py looks at the pages as they are written
 def test_every_link_between_pages_leads_somewhere(site, pages):
     checked = 0
     for path, page in pages.items():
@@ -66,12 +68,14 @@ def test_every_link_between_pages_leads_somewhere(site, pages):
     assert checked > 100
 
 
+@pytest.mark.exhaustive  # test_links.py looks at the pages as they are written
 def test_nothing_is_loaded_from_elsewhere(site, pages):
     assert [load for page in pages.values() for load in page.loads if "//" in load] == []
     styles = "".join(file.read_text("utf-8") for file in site.rglob("*.css"))
     assert re.findall(r"url\([\"']?https?:|@import", styles) == []
 
 
+@pytest.mark.exhaustive  # test_links.py looks at the pages as they are written
 def test_every_formula_is_drawn_without_a_script(site, pages):
     for letter in "abcd":
         html = text_of(site, f"theory/paper_{letter}.html")

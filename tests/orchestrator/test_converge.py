@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from pathlib import Path
 
 import numpy as np
@@ -16,13 +14,11 @@ from yawbench.studies.experiment import NamedRun, experiment_of
 from yawbench.studies.experiment_result import judge_results
 from yawbench.studies.jobs import Job, Outcome
 from yawbench.studies.scenario_experiments import (
-    columns_of,
     convergence_figure,
     convergence_table,
     measure,
     refinements,
 )
-from yawbench.studies.tables import to_csv
 
 from .recorded import results, write
 
@@ -104,14 +100,6 @@ def test_the_table_says_step_error_order_and_cost(tmp_path):
     assert [row[3] for row in table.text()] == ["2.00", "2.00", "-", "-"]
     assert [row[4] for row in table.text()] == ["1.00 s", "2.00 s", "4.00 s", "8.00 s"]
     assert table.text()[-1][2] == "the finest"
-
-
-def test_the_csv_has_plain_numbers_in_si(tmp_path):
-    text = to_csv(columns_of(measure(made(tmp_path, {"extrapolated": 2}), SIGNAL)))
-    rows = list(csv.DictReader(io.StringIO(text)))
-    assert [float(row["step_size [s]"]) for row in rows] == [H, H / 2, H / 4, H / 8]
-    assert rows[-1]["error [1]"] == ""
-    assert float(rows[0]["order [1]"]) == pytest.approx(2.0)
 
 
 def test_runs_that_do_not_differ_cannot_be_drawn(tmp_path):
