@@ -9,7 +9,7 @@ PYTEST = $(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder
 SCENARIO ?= scenarios/fnn_sideslip/25mps.yaml
 unexport PYTHONDONTWRITEBYTECODE  # runs are processes: modules are compiled once, not in each of them
 
-.PHONY: setup fmus demo report run test test-all bench lint format docs clean
+.PHONY: setup fmus demo report run test test-all campaigns bench lint format docs clean
 
 setup: $(READY)
 
@@ -41,9 +41,12 @@ test: $(READY_TO_TEST) fmus  # what checks everything once; test-all adds what i
 test-all: $(READY_TO_TEST) fmus
 	$(PYTEST)
 
+campaigns: $(READY_TO_TEST) fmus  # attacks on the program, an hour
+	$(BIN)/python -m campaigns
+
 bench: $(READY_TO_TEST) fmus
-	$(BIN)/python -m tests.bench
-	$(BIN)/python -m tests.bench_pages
+	$(BIN)/python -m benchmarks.runs
+	$(BIN)/python -m benchmarks.pages
 
 lint: $(READY_TO_TEST)
 	$(BIN)/ruff check .

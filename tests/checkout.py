@@ -10,7 +10,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 CODE = ("components", "vocabulary", "foundation", "fmus", "orchestrator", "scenarios", "yawbench")
-PARTS = (*CODE, "docs", "tests")
+PARTS = (*CODE, "docs", "tests", "campaigns")
 FILES = ("README.md", "CHANGELOG.md", "LICENSE", "Makefile", "mkdocs.yml", "pyproject.toml")
 
 

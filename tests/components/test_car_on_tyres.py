@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from cmath import exp as cexp
 from dataclasses import dataclass
 from functools import cache
 from math import isfinite, log2, pi, sin
@@ -126,12 +125,6 @@ def test_frequency_response_at_small_angles_is_that_of_the_linear_single_track_m
         phasor = 2j * np.mean(found[last, column] * turning) / amplitude
         assert abs(phasor / expected) == pytest.approx(1.0, abs=3e-4)
         assert np.angle(phasor / expected) == pytest.approx(0.0, abs=3e-4)
-
-
-def test_the_phasor_evaluation_itself_is_exact():
-    time = np.arange(4000) * 0.001
-    y = 0.3 * np.sin(2 * pi * time + 0.7)
-    assert 2j * np.mean(y * np.exp(-2j * pi * time)) == pytest.approx(0.3 * cexp(0.7j), rel=1e-12)
 
 
 # ---- an independent solution of the same equations

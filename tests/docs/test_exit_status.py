@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 import yawbench as yb
-from docs.generate import library
 from tests.checkout import ROOT
 from tests.commands import status_of
 from tests.orchestrator.test_batch_commands import SCENARIO, STUDY
@@ -99,33 +98,3 @@ def test_a_failed_run_ends_with_1_and_an_interrupted_one_with_130(folder, fmus, 
 
 def _interrupted() -> None:
     raise KeyboardInterrupt
-
-
-def test_other_pages_refer_to_the_table_and_none_lists_the_statuses_again():
-    for page in (*(ROOT / "docs").glob("*.md"), ROOT / "README.md"):
-        if page == PAGE:
-            continue
-        text = page.read_text("utf-8")
-        assert ("exit status" not in text.lower()) or "running.md#exit-status" in text, page
-        listed = [row for row in text.splitlines() if re.search(r"exit status.*\b0\b.*\b1\b.*\b2 if\b", row)]
-        assert not listed, page
-        assert "a test was not passed" not in text, page
-
-
-def test_what_the_help_says_of_exit_status_1_is_in_the_table(capsys):
-    said = {}
-    for command in ("measured", "evaluate", "validate", "second-opinion"):
-        assert status_of(command, "--help") == 0
-        said[command] = " ".join(capsys.readouterr().out.split())
-        assert "Exit status 1" in said[command]
-        assert f"`{command}" in statuses()[1]
-
-
-def test_the_results_of_examples_are_in_the_box_of_their_examples():
-    """A line of an example, or of what it prints, is indented up to the next empty line."""
-    inside, boxes = False, 0
-    for row in library.page().splitlines():
-        inside = bool(row.strip()) and (inside or row.strip().startswith(">>>"))
-        boxes += inside
-        assert not inside or row.startswith("    "), row
-    assert boxes > 50

@@ -69,18 +69,3 @@ def test_generated_pages_are_those_that_the_program_writes(page):
         build_all(HERE)
     written = (DOCS / page).read_text("utf-8")
     assert written == text_of(page), f"{page}: python -m docs.generate writes it anew"
-
-
-def test_no_page_has_a_form_that_only_mkdocs_shows():
-    """Boxes are GitHub's alerts, which a hook turns into those of mkdocs."""
-    own = re.compile(
-        r"^\s*(!!!|\?\?\?\+?|===) |^\s*:::|^--8<--|:(?:material|octicons)-|\]\([^)]*\)\{|\{: ", re.MULTILINE
-    )
-    shown = {str(file.relative_to(ROOT)): own.findall(prose(file)) for file in markdown_files()}
-    assert len(shown) > 40
-    assert {name: forms for name, forms in shown.items() if forms} == {}
-    alerts = sum(
-        len(re.findall(r"^> \[!WARNING\]\n> \*\*.+?\.\*\* ", prose(f), re.M)) for f in markdown_files()
-    )
-    assert alerts > 10
-    assert alerts == sum(prose(file).count("[!") for file in markdown_files())

@@ -32,7 +32,7 @@ from yawbench.fmus.reference_result import FOLDER
 from yawbench.foundation.cache import content_of
 from yawbench.foundation.errors import BuildError
 from yawbench.orchestrator.plan import Instance
-from yawbench.vocabulary.roles import ROLES, role_in
+from yawbench.vocabulary.roles import role_in
 
 NAMES = list(find_components())
 SOME = ["controller_off", "driver_sine", "tyre_linear"]
@@ -347,17 +347,6 @@ def test_without_a_compiler_the_stock_library_is_used_and_the_reason_given(check
         assert b"fmi2Instantiate" in fmu.read("binaries/linux64/controller_off.so")
     monkeypatch.setenv("CC", "false")
     assert mentions(compile_launcher()[1], "status 1", "compiler", "exit")
-
-
-def test_every_file_in_a_role_folder_becomes_an_fmu():
-    files = [
-        f"{ROLES[folder.name].name}_{file.stem}"
-        for folder in COMPONENTS.iterdir()
-        if folder.name in ROLES
-        for file in folder.glob("*.py")
-        if file.stem != "__init__"
-    ]
-    assert sorted(files) == NAMES
 
 
 @pytest.mark.sampled(5)

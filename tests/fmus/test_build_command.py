@@ -11,7 +11,6 @@ from typer.testing import CliRunner
 
 from tests.refusals import each_mentions, mentions
 from yawbench.commands.build import build
-from yawbench.fmus.build import find_recipes
 from yawbench.foundation.errors import BuildError
 from yawbench.foundation.workers import Pool
 
@@ -51,13 +50,6 @@ def test_it_builds_nothing_twice_unless_forced(tmp_path):
     run("controller_off", "driver_sine", "--out", tmp_path)
     assert each_mentions(run("controller_off", "driver_sine", "--out", tmp_path).stderr, ("2", "date"))
     assert mentions(run("driver_sine", "--out", tmp_path, "--force").stderr, "driver_sine", "built")
-
-
-@pytest.mark.exhaustive
-def test_it_builds_everything_by_default(tmp_path):
-    done = run("--out", tmp_path)
-    assert done.exit_code == 0
-    assert {file.stem for file in tmp_path.iterdir()} == set(find_recipes())
 
 
 def test_a_name_that_is_no_component_is_wrong_input(tmp_path):

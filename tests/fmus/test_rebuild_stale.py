@@ -283,26 +283,6 @@ def test_a_component_that_has_no_fmu_yet_is_built(project):
     assert not (project / "fmus/driver_sine.fmu").exists()
 
 
-@pytest.mark.exhaustive
-def test_a_component_that_has_no_fmu_yet_is_guessed_from_a_wrong_name(project):
-    (project / "fmus/driver_sine.fmu").unlink()
-    done = command(project, "check", "driver.yaml", "--swap", "driver=driver_sin")
-    assert done.returncode == 2
-    assert mentions(done.stderr, "'driver_sine'")
-
-
-@pytest.mark.exhaustive
-def test_a_copy_of_a_components_fmu_in_another_folder_is_told_of_and_not_touched(project):
-    (project / "before").mkdir()
-    shutil.copy(project / "fmus/driver_sine.fmu", project / "before")
-    old = (project / "before/driver_sine.fmu").read_bytes()
-    double(project / OURS)
-    done = command(project, "run", "driver.yaml", "--fmus", "before", "--out", "out")
-    assert done.returncode == 0
-    assert mentions(done.stderr, "note", "driver_sine.fmu")
-    assert (project / "before/driver_sine.fmu").read_bytes() == old
-
-
 def test_nobody_waits_for_the_builder_if_everything_is_current(tmp_path, yawbench):
     (tmp_path / "driver.yaml").write_text(DRIVER)
     yawbench("check", tmp_path / "driver.yaml")
@@ -325,15 +305,6 @@ def test_a_file_that_comes_before_a_known_one_is_noticed(tmp_path):
     package.mkdir()
     (package / "__init__.py").touch()
     assert not SourceDigests().confirm(evidence)
-
-
-@pytest.mark.exhaustive
-def test_a_file_that_comes_before_a_known_one_makes_an_fmu_stale(project):
-    package = project / "components/driving/speed_holding"
-    package.mkdir()
-    (package / "__init__.py").write_text("undefined_name\n")
-    done = command(project, "check", "driver.yaml")
-    assert mentions(done.stderr, "'undefined_name'", "defined")
 
 
 # ---- files and users

@@ -83,14 +83,6 @@ def test_compare_puts_the_runs_side_by_side(yawbench, folder):
         assert (folder / where / run / "results.csv").is_file()
 
 
-def test_compare_finds_a_wrong_name_before_anything_runs(yawbench, folder):
-    status, out, said = yawbench("compare", "half.yaml", "--swap", "controller=controller_of", "--out", "o")
-    assert status == 2
-    assert out == ""
-    assert mentions(said, "'controller_off'")
-    assert not (folder / "o").exists()
-
-
 def test_compare_reports_a_failed_run_and_keeps_the_others(yawbench, folder):
     (folder / "o").mkdir()
     (folder / "o" / "controller_off").write_text("a file where the folder should be")
@@ -140,15 +132,6 @@ def test_converge_names_a_wrong_signal_or_algorithm(yawbench):
     assert each_mentions(said, ("--algorithm gauss", "gauss_seidel", "jacobi", "extrapolated"))
 
 
-def test_converge_of_what_does_not_depend_on_the_step_has_no_figure(yawbench, folder):
-    status, out, _ = yawbench("converge", "half.yaml", "--signal", "driver.steer_angle", "--halvings", "2",
-                              "--out", "o")  # fmt: skip
-    assert status == 0
-    assert "the finest" in out
-    assert (folder / "o/converge.csv").is_file()
-    assert not (folder / "o/converge.svg").exists()
-
-
 def test_study_runs_judges_and_draws(yawbench, folder):
     (folder / "study.yaml").write_text(STUDY + FIGURES)
     status, out, said = yawbench("study", "study.yaml", "--out", "o")
@@ -172,15 +155,6 @@ def test_study_makes_again_only_what_has_not_been_made_of_the_same_scenario(yawb
     ]
     assert (ids[0] == again[0], ids[1] == again[1]) == (False, True)
     assert "finished already" not in yawbench("study", "study.yaml", "--out", "o", "--fresh")[2]
-
-
-def test_options_change_all_runs_of_a_study_and_are_named(yawbench, folder):
-    status, _, said = yawbench("study", "study.yaml", "--set", "driver.amplitude=0.01", "--out", "o")
-    assert status == 0
-    assert mentions(said, "driver.amplitude", "0.01")
-    record = json.loads((folder / "o/off/run.json").read_text())
-    assert record["fmus"]["driver"]["parameters"]["amplitude"] == 0.01
-    assert mentions((folder / "o/report.html").read_text(), "driver.amplitude", "0.01")
 
 
 def test_study_judges_what_is_there_without_running(yawbench, folder):
@@ -285,20 +259,6 @@ def test_ctrl_c_ends_a_study_and_keeps_finished_runs(fmus, folder):
     assert process.wait() == 130
     assert mentions(said.splitlines()[-1], "results")
     assert json.loads((folder / "o/fuzzy_sideslip/run.json").read_text())["status"] == "completed"
-
-
-@pytest.mark.exhaustive
-def test_plot_draws_one_run_into_its_folder_and_several_beside_them(yawbench, folder):
-    yawbench("study", "study.yaml", "--out", "o")
-    status, _, said = yawbench("plot", "o/off")
-    assert status == 0
-    assert each_mentions(said, ("o/off/overview.svg", "overview.png"))
-    status, _, _ = yawbench("plot", "o/off", "o/fuzzy_sideslip")
-    assert status == 0
-    assert (folder / "o/overview.png").is_file()
-    status, _, said = yawbench("plot", "o/off", "--panel", "yaw_rate_ref", "--out", "elsewhere")
-    assert status == 0
-    assert each_mentions(said, ("elsewhere/overview.svg", "overview.png"))
 
 
 def test_plot_runs_a_scenario_whose_results_are_missing_or_of_another_controller(yawbench, folder):

@@ -9,12 +9,11 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from matplotlib.figure import Figure
 
 from tests.changed import changed
 from tests.refusals import each_mentions, refused
 from yawbench.commands.results import distinct
-from yawbench.figures.plots import LabelledRun, shown_by
+from yawbench.figures.plots import LabelledRun
 from yawbench.figures.style import save
 from yawbench.foundation.errors import Diagnostic, ScenarioError
 from yawbench.metrics.expressions import MetricValue
@@ -61,10 +60,6 @@ def test_one_run_per_fmu_of_a_list(scenario):
     assert [job.label for job in jobs] == ["a", "b", "c"]
     assert [given(job) for job in jobs] == [{"controller": fmu} for fmu in ("a", "b", "c")]
     assert [job.name for job in jobs] == ["a", "b", "c"]
-
-
-def test_a_repeated_option_adds_to_the_list(scenario):
-    assert labels(scenario, "controller=a", "controller=b", "controller=a") == ["a", "b"]
 
 
 def test_an_fmu_named_twice_runs_once(scenario):
@@ -130,22 +125,6 @@ def test_parameters_alone_set_the_scenarios_own_fmu_against_itself(scenario):
 def test_a_comparison_with_itself_is_an_error(scenario):
     with refused(ScenarioError, "option-invalid", names=("--swap controller=a", "compare", "controller")):
         labels(scenario, "controller=controller_fnn")
-
-
-def test_a_unit_that_does_not_exist_is_named_with_the_likely_one(scenario):
-    with refused(
-        ScenarioError,
-        "instance-unknown",
-        names=("--swap controler=controller_off", "'controler'", "'controller'"),
-    ):
-        labels(scenario, "controler=controller_off")
-
-
-def test_an_option_without_an_fmu_is_an_error(scenario):
-    with refused(
-        ScenarioError, "option-invalid", names=("--swap controller", "--swap INSTANCE=FMU", "controller")
-    ):
-        labels(scenario, "controller")
 
 
 METRICS = {
@@ -227,31 +206,6 @@ def stars(*values: tuple[float, ...]) -> list[list[int]]:
 )
 def test_the_best_is_marked_where_it_reads_better_and_doing_nothing_wins_no_effort(values, expected):
     assert stars(*values) == expected
-
-
-def test_no_run_leaves_the_axes_of_the_signals_that_differ_most(tmp_path):
-    lost = [
-        LabelledRun(name, car(gain)) for name, gain in (("a", 1.0), ("b", 40.0), ("c", 50.0), ("d", 60.0))
-    ]
-    for whole in (True, False):
-        (panel,) = shown_by(lost, ["sideslip"], whole=whole)
-        axes = Figure().add_subplot()
-        panel.draw(axes)
-        _, high = axes.get_ylim()
-        assert high >= max(line.get_ydata().max() for line in axes.get_lines()), whole
-    (panel,) = shown_by(lost[:2] + lost[:1], ["sideslip"])
-    axes = Figure().add_subplot()
-    panel.draw(axes)
-    assert axes.get_ylim()[1] < max(line.get_ydata().max() for line in axes.get_lines())  # one of three may
-
-
-def test_a_comparison_without_any_result_still_writes_its_tables(findings, tmp_path):
-    empty = judge_results(findings.experiment, tmp_path / "none")
-    drawn, problems = draw_all(empty, tmp_path / "none")
-    write_findings(empty, drawn, tmp_path / "none")
-    assert len(problems) == 2
-    assert comparison_view(empty) is None
-    assert (tmp_path / "none/table.csv").is_file()
 
 
 def test_folders_are_told_apart_by_the_shortest_ends_of_their_paths():

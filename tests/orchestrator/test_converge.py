@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +11,6 @@ from tests.changed import changed
 from tests.refusals import mentions, refused
 from yawbench.foundation.errors import Diagnostic, ResultsError, ScenarioError
 from yawbench.studies.convergence import (
-    columns_of,
     convergence_figure,
     convergence_table,
     measure,
@@ -22,7 +19,6 @@ from yawbench.studies.convergence import (
 from yawbench.studies.experiment import NamedRun, experiment_of
 from yawbench.studies.experiment_result import judge_results
 from yawbench.studies.jobs import Job, Outcome
-from yawbench.studies.tables import to_csv
 
 from .recorded import results, write
 
@@ -104,25 +100,6 @@ def test_the_table_says_step_error_order_and_cost(tmp_path):
     assert [row[3] for row in table.text()] == ["2.00", "2.00", "-", "-"]
     assert [row[4] for row in table.text()] == ["1.00 s", "2.00 s", "4.00 s", "8.00 s"]
     assert table.text()[-1][2] == "the finest"
-
-
-def test_the_csv_has_plain_numbers_in_si(tmp_path):
-    text = to_csv(columns_of(measure(made(tmp_path, {"extrapolated": 2}), SIGNAL)))
-    rows = list(csv.DictReader(io.StringIO(text)))
-    assert [float(row["step_size [s]"]) for row in rows] == [H, H / 2, H / 4, H / 8]
-    assert rows[-1]["error [1]"] == ""
-    assert float(rows[0]["order [1]"]) == pytest.approx(2.0)
-
-
-def test_the_figure_shows_error_over_step_and_over_cost(tmp_path):
-    rows = measure(made(tmp_path, {"extrapolated": 2, "jacobi": 1}), SIGNAL)
-    figure = convergence_figure(rows, SIGNAL, "title", "note")
-    by_step, by_cost = figure.axes
-    assert [axes.get_xscale() + axes.get_yscale() for axes in figure.axes] == ["loglog", "loglog"]
-    assert by_step.get_lines()[0].get_xdata() == pytest.approx([40, 20, 10])
-    assert by_cost.get_lines()[1].get_xdata() == pytest.approx([1, 2, 4, 8])
-    assert [text.get_text() for text in by_step.texts] == ["order 1", "order 2"]
-    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["extrapolated", "jacobi"]
 
 
 def test_runs_that_do_not_differ_cannot_be_drawn(tmp_path):

@@ -39,14 +39,21 @@ def record(folder: Path, made: Trace, **changes: object) -> Path:
 
 
 @pytest.fixture
-def series(tmp_path) -> Path:
+def series(driven, tmp_path) -> Path:
+    """A copy of the folder of a driven series."""
+    return Path(shutil.copytree(driven, tmp_path / "series"))
+
+
+@pytest.fixture(scope="module")
+def driven(tmp_path_factory) -> Path:
     """The folder of a driven series with A = 180 degrees, which asks for two amplitudes to each side.
 
     Beside its runs are those of slowly increasing steer, which give 40 degrees. The last run failed after the
     times that are judged, so it is judged as far as it goes.
     """
+    place = tmp_path_factory.mktemp("driven")
     for name, side in (("left", 1.0), ("right", -1.0)):
-        folder = tmp_path / "slowly_increasing_steer" / name
+        folder = place / "slowly_increasing_steer" / name
         record(folder, slow_steer(side, sampling=SAMPLING["200 Hz"]))
     angle, traces = radians(180.0), []
     for name, side in (("left", 1.0), ("right", -1.0)):
@@ -55,12 +62,12 @@ def series(tmp_path) -> Path:
             made = trace(side * amplitude, sampling=SAMPLING["200 Hz"])
             failed = side < 0.0 and amplitude == amplitudes(angle)[-1]
             error = {"kind": "SimulationError", "message": "the car has rolled over"}
-            record(tmp_path / label, made, **({"status": "failed", "error": error} if failed else {}))
-            traces.append(trace_of(load_results(tmp_path / label), label))
+            record(place / label, made, **({"status": "failed", "error": error} if failed else {}))
+            traces.append(trace_of(load_results(place / label), label))
     judged = [DWELL.evaluate(one, angle) for one in traces]
-    driven = judge_series(judged, angle)
-    EvaluatedRuns(DRIVE, DWELL, traces, judged, driven, angle, tmp_path).conclude(each=False)
-    return tmp_path
+    of_series = judge_series(judged, angle)
+    EvaluatedRuns(DRIVE, DWELL, traces, judged, of_series, angle, place).conclude(each=False)
+    return place
 
 
 def content(folder: Path) -> dict:

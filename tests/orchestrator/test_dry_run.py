@@ -12,12 +12,7 @@ from pathlib import Path
 import pytest
 
 from tests.checkout import ROOT
-from yawbench.fmus import rebuild_stale
-from yawbench.fmus.build_stamp import BuildStamp
-from yawbench.fmus.opener import HOME
-from yawbench.fmus.rebuild_stale import FmuUpdater
-from yawbench.studies import dry_run
-from yawbench.studies.dry_run import Forecast, Pace, Span, forecast_table
+from yawbench.studies.dry_run import Forecast, Span, forecast_table
 from yawbench.studies.journal import records_in
 
 from .test_batch_commands import SCENARIO, STUDY
@@ -94,20 +89,6 @@ def test_runs_are_to_be_made_until_they_are_made(command, runs, forecast, yawben
     assert (again["finished"], again["left"]) == (0, [runs, runs])
 
 
-@pytest.mark.exhaustive
-def test_a_region_is_bounded_by_its_first_and_its_last_look(forecast, yawbench, fmus):
-    made = forecast("study", "region.yaml")
-    least, most = made["left"]
-    assert forecast("study", "region.yaml", "--quick")["left"] == [2, 2]
-    assert 2 + 10 <= least < most
-    made_by(yawbench, fmus, "study", "region.yaml")
-    recorded = len(records_in(Path("results") / Path.cwd().name / "region"))
-    assert least - 2 <= recorded <= most - 2
-    after = forecast("study", "region.yaml")
-    assert after["finished"] == recorded + 2
-    assert after["left"] == [0, most - 2 - recorded]
-
-
 def test_a_tuning_takes_its_budget_and_the_runs_beside_it(forecast, yawbench, fmus):
     assert forecast("tune", "tuning.yaml")["left"] == [5 * 3 + 1, 5 * 3 + 1]
     status, out, _ = yawbench("tune", "tuning.yaml", "--fmus", fmus, "--json")
@@ -135,20 +116,6 @@ def test_time_is_that_of_the_processors_and_bounds_are_in_words():
     assert (title, finished, left) == ("many", "0", "10 to 20")
     assert time == "75 s to 2.5 min"
     assert size == "5 MB to 10 MB"
-
-
-def test_further_sets_of_fmus_are_not_measured(monkeypatch, fmus, tmp_path):
-    from yawbench.planner import Planner
-
-    (tmp_path / "half.yaml").write_text(SCENARIO)
-    planner = Planner(build=False)
-    plan = planner.plan(planner.load(tmp_path / "half.yaml", ()), fmus=fmus, isolated=False)
-    monkeypatch.setattr(dry_run, "MEASURED", 1)
-    pace = Pace({("others",): (2.0, 0.5)})
-    assert pace.of_plan(plan) == pytest.approx(2.0 + 0.5 * plan.n_steps)
-    begin, step = dry_run._measured(plan)
-    assert begin >= 0.0
-    assert step >= 0.0
 
 
 def test_a_ranking_is_counted_with_an_assumed_angle_until_it_is_measured(yawbench, tmp_path, monkeypatch):
@@ -196,26 +163,9 @@ def test_outside_a_checkout_dry_runs_work_and_runs_take_the_fmus_of_the_cache(in
     assert (status, json.loads(out)["forecasts"][0]["left"]) == (0, [2, 2])
     assert sorted(path.name for path in work.iterdir()) == ["half.yaml", "sweep.yaml"]
     assert not [*installed.rglob("*.fmu")]
-    for command in ("run", "check"):
-        assert call(command, "half.yaml", "--no-build")[0] == 0
-    assert call("sweep", "sweep.yaml")[0] == 0
+    assert call("sweep", "sweep.yaml", "--no-build")[0] == 0
     status, out, _ = call("sweep", "sweep.yaml", "--dry-run", "--json", "--no-build")
     assert (status, json.loads(out)["forecasts"][0]["finished"]) == (0, 2)
-    assert call("sweep", "sweep.yaml", "--no-run")[0] == 0
-    status, _, said = call("run", "half.yaml", "--no-build", "--swap", "controller=controller_fuzzy_sidesl")
-    assert status == 2
-    assert "did you mean 'controller_fuzzy_sideslip'" in said
-
-
-def test_a_dry_run_leaves_stale_fmus_as_they_are(monkeypatch):
-    updater = FmuUpdater(lambda _: None)
-    archive = HOME / "driver_sine.fmu"
-    monkeypatch.setattr(updater, "_build", lambda *_: pytest.fail("is built"))
-    monkeypatch.setattr(updater, "_key", lambda *_: "another key")
-    monkeypatch.setattr(rebuild_stale, "read_stamp", lambda _: BuildStamp("driver_sine", "", "old"))
-    monkeypatch.setattr(rebuild_stale.os.path, "exists", lambda _: True)
-    path, built = updater.bring(archive, build="missing")
-    assert (path, built and built.current) == (archive, False)
 
 
 def test_no_run_and_dry_run_exclude_each_other(yawbench, forecast):

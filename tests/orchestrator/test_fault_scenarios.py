@@ -11,7 +11,6 @@ from matplotlib.colors import to_hex
 import yawbench as yb
 from tests.refusals import each_mentions, mentions, texts_of
 from yawbench.cli import main
-from yawbench.commands.experiments import command_of
 from yawbench.figures.plots import FAULTY, LabelledRun, draw
 from yawbench.foundation.errors import ScenarioError, YawbenchError
 from yawbench.orchestrator.fault_kinds import Fault, FaultLocation, FaultySignal
@@ -279,16 +278,4 @@ def test_figures_mark_when_runs_were_faulty_and_the_legend_says_how():
     alone = draw([LabelledRun("broken", broken)], ["sideslip"])
     assert mentions(
         [text.get_text() for box in alone.legends for text in box.get_texts()][-1], "gyro.yaw_rate", "2 s"
-    )
-
-
-def test_the_command_of_a_page_gives_faults_as_the_option_takes_them():
-    (change,) = read_changes(faults=["a.x -> b: bias 1 deg from 2 s"])
-    assert mentions(
-        command_of("sweep", Path("s.yaml"), fault=[f"{change.faulty}: {change.value}"]),
-        "s.yaml",
-        "--fault",
-        "a.x",
-        "1 deg",
-        "2 s",
     )

@@ -163,60 +163,6 @@ def test_mistakes_of_a_fit_file_have_a_line(folder, old, new, code, line):
     assert (code, line) in {(one.code, one.location.line) for one in refused.value.diagnostics}
 
 
-FIVE = {
-    "vehicle.yaw_inertia": (1791.6, 1.25, "low: 800, high: 4000"),
-    "vehicle.cornering_stiffness_scale_front": (0.72, 0.8, "low: 0.2, high: 2"),
-    "vehicle.cornering_stiffness_scale_rear": (1.0, 1.2, "low: 0.2, high: 2"),
-    "inputs.tyre.friction_f*": (0.9, 0.85, "low: 0.3, high: 2"),
-    "inputs.tyre.friction_r*": (0.9, 1.15, "low: 0.3, high: 2"),
-}
-"""Free parameter -> its value, how far from it the search starts, bounds."""
-
-
-@pytest.mark.exhaustive
-@pytest.mark.parametrize(
-    ("noise", "within", "most"),
-    [((0.0, 0.0), 1e-4, 80), ((0.1, 0.05), 0.002, 80), ((0.3, 0.2), 0.007, 80)],
-    ids=["none", "production", "poor"],
-)
-def test_five_parameters_are_found_from_three_runs_near_the_limit(noise, within, most, tmp_path):
-    vehicle = Path(__file__).parents[2] / "scenarios" / "vehicles" / "mid_size.yaml"
-    times, chance = np.arange(0.0, 5.005, 0.01), np.random.default_rng(3)
-    names = ("velocity_x", "sideslip", "yaw_rate", "acceleration_y")
-    spread = dict(zip(names[2:], (np.radians(noise[0]), noise[1]), strict=True))
-    largest = 0.0
-    for k, (size, frequency) in enumerate(((0.05, 0.4), (0.08, 0.4), (0.1, 0.3))):
-        steer = size * np.sin(2.0 * np.pi * frequency * np.maximum(times - 0.3, 0.0))
-        np.savetxt(
-            tmp_path / "steer.csv", np.column_stack([times, steer]), delimiter=",",
-            header="time,steer_angle [rad]", comments="",
-        )  # fmt: skip
-        (tmp_path / "truth.yaml").write_text(SCENARIO.format(vehicle=vehicle, stop=5, file="steer.csv"))
-        made = yb.load(tmp_path / "truth.yaml").run()
-        columns = {name: np.interp(times, made.time, made[f"plant.{name}"]) for name in names}
-        largest = max(largest, float(np.abs(columns["acceleration_y"]).max()))
-        for name, deviation in spread.items():
-            columns[name] = columns[name] + chance.normal(0.0, deviation or 1e-300, times.size)
-        np.savetxt(
-            tmp_path / f"run{k}.csv", np.column_stack([times, steer, *columns.values()]), delimiter=",",
-            header=",".join(["time", "steer_angle", *names]), comments="",
-        )  # fmt: skip
-    assert largest > 8.0
-    (tmp_path / "measured.yaml").write_text(MEASURED.replace("run.csv", "run0.csv, run1.csv, run2.csv"))
-    (tmp_path / "scenario.yaml").write_text(SCENARIO.format(vehicle=vehicle, stop=5, file="measured.yaml"))
-    training = ", ".join(f"{{segment: {k}, begin: 0, end: 5 s}}" for k in (1, 2, 3))
-    free = "\n".join(
-        f"  {name}: {{{bounds}, start: {off * value}}}" for name, (value, off, bounds) in FIVE.items()
-    )
-    fit = FIT.partition("free:\n")[0].replace("[{begin: 0, end: 3 s}]", f"[{training}]")
-    fit = fit.replace("held_out: [{begin: 3 s, end: 4 s}]\n", "")
-    (tmp_path / "fit.yaml").write_text(f"{fit}free:\n{free}\n")
-    found = yb.fit(tmp_path / "fit.yaml", workers=2)
-    for name, (value, *_) in FIVE.items():
-        assert found.values[name] == pytest.approx(value, rel=within)
-    assert found._result.scenario.estimate.sets <= most
-
-
 @pytest.mark.parametrize(
     ("free", "most_sets"),
     [

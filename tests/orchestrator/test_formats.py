@@ -6,7 +6,6 @@ import json
 import math
 import sys
 
-import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
@@ -232,26 +231,6 @@ def test_a_record_that_names_another_file_is_refused(tmp_path):
         names=("run.json", "'../secret.csv'", "results.csv", "results.parquet", "results.mf4"),
     ):
         load_results(folder)
-
-
-@pytest.mark.exhaustive
-def test_plot_draws_results_of_every_format(tmp_path):
-    recorded = car(n=801)
-    for name in FILES:
-        columns = list(recorded.columns)
-        writer = recorder_of(name)(tmp_path / name, columns, [True] * len(columns), recorded.units)
-        table = np.column_stack([recorded.time, *recorded.columns.values()])
-        for begin in range(0, len(table), BLOCK):
-            block = table[begin : begin + BLOCK]
-            for row, values in zip(writer.rows, block, strict=False):
-                row[:] = values
-            writer.write(len(block))
-        writer.finish(recorded.record)
-        writer.close()
-    for name in FILES:
-        main_ok(["plot", str(tmp_path / name)])
-    pictures = [(tmp_path / name / "overview.png").read_bytes() for name in FILES]
-    assert pictures[0] == pictures[1] == pictures[2]
 
 
 def main_ok(arguments):

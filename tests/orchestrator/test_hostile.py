@@ -1,4 +1,4 @@
-"""FMUs that do harm: a sample of `tests.trials.hostile_fmus`, and what is written into a pipe."""
+"""FMUs that do harm: a sample of `campaigns.hostile_fmus`, and what is written into a pipe."""
 
 from __future__ import annotations
 
@@ -9,10 +9,9 @@ import time
 
 import pytest
 
+from campaigns.hostile_fmus import Case, attack
 from yawbench.foundation import processes
 from yawbench.foundation.processes import ProcessLost, Worker
-
-from ..trials.hostile_fmus import Case, attack
 
 pytestmark = [
     pytest.mark.skipif(sys.platform != "linux", reason="compiles for Linux"),

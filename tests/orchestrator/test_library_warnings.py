@@ -66,6 +66,7 @@ def test_the_library_warns_of_no_arithmetic(kind, tmp_path):
 
 
 @pytest.mark.parametrize("kind", GROWTH)
+@pytest.mark.sampled(2)
 def test_commands_print_no_warning_of_a_library(kind, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     write(grown(kind), tmp_path / "grown")

@@ -60,25 +60,6 @@ def write_csv(
     path.write_bytes(("\n".join(rows) + "\n").encode(code))
 
 
-FORMS = {
-    "comma": (",", False, "utf-8"),
-    "semicolon and decimal comma, Latin-1": (";", True, "latin-1"),
-    "tab, Windows": ("\t", True, "cp1252"),
-    "bar": ("|", False, "utf-8-sig"),
-    "spaces": (" ", True, "utf-8"),
-    "UTF-16": (";", True, "utf-16"),
-}
-
-
-@pytest.mark.parametrize(("separator", "comma", "code"), FORMS.values(), ids=FORMS)
-def test_text_of_any_separator_decimal_and_encoding_gives_the_same(separator, comma, code, tmp_path):
-    write_csv(tmp_path / "run.csv", COLUMNS, separator, comma, code)
-    (segment,) = load_measurement(described(tmp_path)).segments
-    assert segment.time == pytest.approx(T, abs=1e-9)
-    assert segment.signals["steering_wheel_angle"] == pytest.approx(STEER, abs=1e-10)
-    assert segment.signals["acceleration_y"] == pytest.approx(SIDE, abs=1e-9)
-
-
 def test_parquet_and_mdf_give_the_same(tmp_path):
     pq.write_table(pa.table(COLUMNS), tmp_path / "run.parquet")
     (segment,) = load_measurement(described(tmp_path, file="run.parquet")).segments

@@ -101,22 +101,6 @@ def test_a_unit_of_any_role_is_built_tested_and_run(beginnings, role, other):
 
 
 @pytest.mark.exhaustive
-def test_a_new_plant_moves_much_as_the_shipped_one_whose_loads_change(beginnings):
-    folder, _ = beginnings
-    runs = [load_results(folder / "results" / name / "25mps") for name in ("my_plant", "my_scenario")]
-    yaw_rates = [run.find("yaw_rate") for run in runs]
-    assert 0.0 < np.abs(yaw_rates[0] - yaw_rates[1]).max() < 0.2 * np.abs(yaw_rates[1]).max()
-
-
-@pytest.mark.exhaustive
-def test_a_new_vehicle_is_the_one_that_its_scenario_drives(beginnings):
-    folder, _ = beginnings
-    run = load_results(folder / "results" / "my_vehicle" / "25mps")
-    assert run.record.scenario["vehicle"] == "../vehicles/my_vehicle.yaml"
-    assert run.record.fmus["plant"].parameters["mass"] == 1100
-
-
-@pytest.mark.exhaustive
 def test_a_new_study_judges_its_claim_and_a_new_sweep_finds_its_limits(beginnings):
     _, made = beginnings
     assert "holds" in made["study"][0]
@@ -140,18 +124,6 @@ def test_in_c_the_source_is_a_folder_with_the_model_description(tmp_path, new):
     expected = {"controllers/idea/idea.c", "controllers/idea/modelDescription.xml"}
     expected |= {"tests/test_idea.py", "scenarios/idea/25mps.yaml", "scenarios/schemas/scenario.json"}
     assert files(tmp_path) == expected
-
-
-@pytest.mark.exhaustive
-def test_it_prints_how_to_build_test_run_and_compare(project):
-    _, printed = project
-    build, test, run, compare = (" ".join(command[1:]) for command in printed["follow_c"][1:])
-    assert mentions(build, "controllers/follow_c", "--out")
-    assert mentions(test, "tests/test_follow_c.py", "pytest")
-    assert mentions(run, "scenarios/follow_c/25mps.yaml")
-    assert mentions(
-        compare, "scenarios/follow_c/25mps.yaml", "--swap controller=controller_off", "controller_follow_c"
-    )
 
 
 @pytest.mark.exhaustive

@@ -194,14 +194,6 @@ def test_failed_runs_count_as_another_verdict_and_are_said(judged):
     assert both.region.spread == math.inf
 
 
-def test_a_run_that_sets_a_value_itself_keeps_it_unless_the_open_value_is_a_factor(judged):
-    absolute = ("times: true, from: 0.5, to: 1.5", "from: 0.025, to: 0.075")
-    findings = judged(absolute)
-    assert findings.claims[0].region.lines[0].flip.words == "0.0600 rad"
-    assert findings.claims[2].region.lines[0].flip is None  # 0.075 against 0.1, which stays
-    assert findings.checks[1].region is None  # nothing touches its run
-
-
 def test_a_variant_may_put_another_scenario_in_place_of_a_runs(judged):
     ratio = re.search(r"    ratio: .*\n", STUDY)[0]
     other = (

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 import json
 import re
 import subprocess
@@ -168,13 +167,6 @@ def test_evaluate_answers_with_what_evaluation_json_has(answers, tmp_path):
     assert made["evaluation"]["test"] == "step-steer"
 
 
-def test_list_answers_with_its_tables(answers):
-    made = answers("list", "metrics", with_fmus=False)
-    assert set(made) == ALWAYS
-    assert [column["heading"] for column in made["tables"][0]["columns"]][:2] == ["metric", "meaning"]
-    assert any(row[0] == "peak(x)" for row in made["tables"][0]["rows"])
-
-
 @pytest.mark.parametrize(
     ("arguments", "code", "location"),
     [
@@ -229,13 +221,6 @@ def test_notes_are_in_the_object_as_infos_and_warnings(answers):
     assert "value-implausible" in {one["code"] for one in made["diagnostics"]}
 
 
-def test_numbers_that_json_does_not_know_are_null():
-    assert output._plain({"a": float("nan"), "b": (float("inf"), True, 3)}) == {
-        "a": None,
-        "b": [None, True, 3],
-    }
-
-
 def test_latex_is_all_that_is_printed_and_compiles_by_its_shape(fmus, tmp_path, monkeypatch, capfd):
     (tmp_path / "half.yaml").write_text(SCENARIO)
     monkeypatch.chdir(tmp_path)
@@ -251,13 +236,6 @@ def test_latex_is_all_that_is_printed_and_compiles_by_its_shape(fmus, tmp_path, 
         rows = [line for line in table.splitlines() if line.endswith("\\\\")]
         assert len(rows) > 1
         assert {len(re.split(r"(?<!\\)&", row)) for row in rows} == {columns}
-
-
-def test_every_command_that_prints_tables_takes_both_forms():
-    for name in plugins.names("command"):
-        command = plugins.find("command", name)
-        if "print_tables(" in inspect.getsource(inspect.unwrap(command)):
-            assert hasattr(command, "tabular"), name
 
 
 def test_a_limit_whose_runs_are_missing_is_unknown(answers, tmp_path):

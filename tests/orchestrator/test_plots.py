@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
-from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
@@ -12,7 +10,7 @@ import pytest
 from tests.refusals import each_mentions, mentions, refused
 from yawbench.figures.panels import LabelledRun, check_panels, thinned
 from yawbench.figures.plots import draw, provenance, title_of
-from yawbench.figures.style import LINES, NOTE_WIDTH, REFERENCE, save
+from yawbench.figures.style import LINES, save
 from yawbench.foundation.errors import ResultsError, ScenarioError
 from yawbench.foundation.messages import printable
 
@@ -74,12 +72,6 @@ def test_angles_are_drawn_in_degrees_and_named_so():
     assert np.max(axes.get_lines()[0].get_ydata()) == pytest.approx(np.degrees(0.03), rel=1e-3)
 
 
-def test_speeds_are_drawn_in_kilometres_per_hour():
-    axes = panel(draw([LabelledRun("run", car())], ["velocity_x"]), "velocity_x")
-    assert axes.get_title(loc="left").endswith("in km/h")
-    assert axes.get_lines()[0].get_ydata()[0] == pytest.approx(90.0)
-
-
 def test_a_signal_with_a_reference_is_drawn_over_it():
     lines = panel(draw([LabelledRun("run", car(1.5))], ["sideslip"]), "sideslip").get_lines()
     assert [line.get_label() == "reference" for line in lines] == [True, False]
@@ -102,14 +94,6 @@ def test_runs_with_references_of_their_own_show_each_in_the_runs_colour():
     assert mentions(legend(figure)[-1], "wide", "pale", "reference")
 
 
-def test_a_reference_that_several_runs_share_is_drawn_once_beside_that_of_another():
-    slow = car(1.0)
-    slow.columns["reference.sideslip_ref"] = 1.5 * slow.columns["reference.sideslip_ref"]
-    figure = draw([SEVERAL[0], LabelledRun("slow", slow), SEVERAL[1], SEVERAL[2]], ["sideslip"])
-    pale = [line for line in panel(figure, "sideslip").get_lines() if line.get_label() == "reference"]
-    assert [line.get_color() for line in pale] == [REFERENCE["color"], LINES[1]["color"]]
-
-
 def test_an_angle_that_passes_half_a_turn_is_not_joined_across_the_panel():
     t = np.linspace(0.0, 4.0, 401)
     angle = np.angle(np.exp(1j * np.pi * 0.6 * t))  # beyond half a turn at 1.67 s
@@ -119,29 +103,6 @@ def test_an_angle_that_passes_half_a_turn_is_not_joined_across_the_panel():
     drawn = line.get_ydata()
     assert np.isnan(drawn).sum() == 1
     assert np.nanmax(np.abs(np.diff(drawn))) < 2.0
-
-
-def test_a_panel_without_a_unit_ends_its_title_without_a_comma():
-    slips = {f"plant.slip_ratio_{w}": [0.0, 0.1] for w in ("fl", "fr", "rl", "rr")}
-    figure = draw([LabelledRun("a", results(slips)), LabelledRun("b", results(slips))], ["slip_ratio_*"])
-    assert mentions(panel(figure, "slip_ratio_rl").get_title(loc="left"), "slip", "rear", "left")
-
-
-def test_a_long_note_on_lost_cars_is_broken_into_lines():
-    lost = [LabelledRun(f"a car with a rather long name, number {k}", car(40.0 + k)) for k in range(3)]
-    held = [LabelledRun(f"held {k}", car(1.1)) for k in range(3)]  # no more may leave the axes than stay
-    axes = panel(draw([*lost, *held], ["sideslip"]), "sideslip")
-    rows = axes.texts[0].get_text().splitlines()
-    assert len(rows) > 1
-    assert max(map(len, rows)) <= NOTE_WIDTH
-
-
-def test_runs_differ_in_colour_and_in_dash_pattern():
-    assert len({style["color"] for style in LINES}) == len(LINES)
-    dashes = [(style["linestyle"], style["linewidth"]) for style in LINES]
-    assert len({str(d) for d in dashes}) == len(LINES)
-    lines = panel(draw(SEVERAL, ["acceleration_y"]), "acceleration_y").get_lines()
-    assert [line.get_color() for line in lines] == [style["color"] for style in LINES[:3]]
 
 
 def test_wheels_of_one_run_share_a_panel_with_a_legend():
@@ -204,10 +165,6 @@ def test_a_narrow_path_is_stretched_and_the_figure_says_how_much():
     assert 3.0 < high - low < 12.0
 
 
-def test_a_standing_car_has_a_path_too():
-    assert panel(path_of(0.0, 0.0), "path") is not None
-
-
 def test_title_and_provenance_come_from_the_runs_records():
     figure = draw(SEVERAL, ["yaw_rate"])
     texts = [text.get_text() for text in figure.texts]
@@ -228,19 +185,6 @@ def test_a_run_that_ended_early_is_named():
     )
 
 
-def test_nothing_of_the_head_covers_a_panel():
-    labels = ["a controller with a rather long name indeed", "another one of about that length", "short"]
-    runs = [LabelledRun(label, run.results) for label, run in zip(labels * 2, SEVERAL * 2, strict=True)]
-    figure = draw(runs, ["steer_angle", "sideslip", "path"], title="A title of two lines " * 8)
-    figure.draw_without_rendering()
-    renderer = figure.canvas.get_renderer()
-    head = figure.legends[0].get_window_extent(renderer)
-    title = figure.texts[0].get_window_extent(renderer)
-    assert title.y0 > head.y1
-    assert all(axes.get_tightbbox(renderer).y1 < head.y0 for axes in figure.axes)
-    assert head.x1 < figure.bbox.x1
-
-
 def test_a_thinned_line_keeps_its_peaks_and_its_ends():
     t = np.linspace(0, 1, 100_001)
     x = np.sin(9 * t)
@@ -252,27 +196,10 @@ def test_a_thinned_line_keeps_its_peaks_and_its_ends():
     assert np.all(np.diff(thin_t) > 0)
 
 
-@pytest.mark.exhaustive
-def test_files_are_svg_and_png_and_the_same_every_time(tmp_path: Path):
-    first = save(draw(SEVERAL), tmp_path / "a" / "overview.25mps")
-    again = save(draw(SEVERAL), tmp_path / "b" / "overview.25mps")
-    assert [path.name for path in first] == ["overview.25mps.svg", "overview.25mps.png"]
-    assert [path.read_bytes() for path in first] == [path.read_bytes() for path in again]
-    assert first[0].read_text().startswith("<?xml")
-    assert all(5_000 < path.stat().st_size < 1_000_000 for path in first)
-
-
 def test_a_figure_that_cannot_be_written_is_one_sentence(tmp_path):
     (tmp_path / "file").write_text("")
     with refused(ResultsError, "results-unwritable", names=("overview", "figure", "directory")):
         save(path_of(60.0, 40.0), tmp_path / "file" / "figures" / "overview")
-
-
-def test_a_title_that_the_font_cannot_show_is_no_warning(tmp_path):
-    figure = draw([LabelledRun("run", car())], ["yaw_rate"], title="日本")
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        save(figure, tmp_path / "overview")
 
 
 def test_a_portrait_shows_one_signal_over_the_other_with_references_and_ends():
@@ -287,21 +214,6 @@ def test_a_portrait_shows_one_signal_over_the_other_with_references_and_ends():
     assert end.get_xdata()[0] == pytest.approx(degrees * run["plant.sideslip"][-1])
     assert axes.get_xlabel() == "$β$ in °"
     assert axes.get_ylabel() == "$r$ in °/s"
-
-
-def test_a_portrait_of_a_lost_car_leaves_the_axes_to_the_one_that_is_not():
-    axes = draw([LabelledRun("lost", car(60.0)), LabelledRun("held", car(0.9))], ["yaw_rate(sideslip)"]).axes[
-        0
-    ]
-    held = 180 / np.pi * np.max(np.abs(car(0.9)["plant.sideslip"]))
-    assert held < axes.get_xlim()[1] < 2 * held
-    assert mentions([text.get_text() for text in axes.texts], "lost")
-
-
-def test_portraits_stand_side_by_side_and_keep_the_labels_of_their_axes():
-    figure = draw([LabelledRun("a", car())], ["yaw_rate(sideslip)", "sideslip(yaw_rate)", "yaw_rate"])
-    left, right, below = figure.axes
-    assert left.get_xlabel() and right.get_xlabel() and below.get_xlabel() == "$t$ in s"
 
 
 def test_a_portrait_of_a_signal_that_was_not_recorded_does_not_exist():

@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import csv
 import json
-import re
-import subprocess
-import sys
 from math import radians
 from pathlib import Path
 
@@ -14,9 +11,8 @@ import pytest
 
 from tests.commands import status_of
 from tests.refusals import mentions
-from yawbench.figures.display import shown
 from yawbench.foundation.errors import Diagnostic
-from yawbench.ranking.ranking import EntrySpec, load_ranking
+from yawbench.ranking.ranking import EntrySpec
 from yawbench.ranking.ranking_scores import (
     UNHELD,
     WORST,
@@ -24,7 +20,6 @@ from yawbench.ranking.ranking_scores import (
     RankedRun,
     RankedState,
     RankingCell,
-    deciding_digits,
     placed,
     told_apart,
 )
@@ -109,24 +104,6 @@ def test_entries_whose_intervals_overlap_share_a_place_and_those_far_apart_do_no
     assert abs(nine.low - draws.ppf(0.025)) <= 1 and abs(nine.high - draws.ppf(0.975)) <= 1
     apart, pairs = told_apart(ranked)
     assert (apart, pairs) == (4, 6)  # neither nine and eight nor one and none
-
-
-def test_numbers_that_decide_places_read_differently():
-    close = [
-        standing("first", *2 * [[driven(sideslip=0.300001)]]),
-        standing("second", *2 * [[driven(sideslip=0.300004)]]),
-        standing("bad", [driven(stability=0.0, sideslip=0.300004)] + [driven()] * 999, [driven()]),
-        standing("worse", [driven(stability=0.0, sideslip=0.3)] * 2 + [driven()] * 998, [driven()]),
-    ]
-    ranked = placed(close)
-    digits = deciding_digits(ranked)
-    slips = [shown(one.mean("sideslip"), "rad", digits=digits.sideslip) for one in ranked]
-    shares = [shown(one.share, "%", digits=digits.share) for one in ranked]
-    known = {one.entry: k for k, one in enumerate(ranked)}
-    assert len({slips[known[name]] for name in ("first", "second")}) == 2
-    assert len({shares[known[name]] for name in ("bad", "worse")}) == 2
-    far = placed([standing(name, [driven(sideslip=x)]) for name, x in (("a", 0.2), ("b", 0.3))])
-    assert deciding_digits(far) == (2, 3)
 
 
 def test_an_entry_without_a_run_is_missing_and_has_no_place():
@@ -216,23 +193,6 @@ def test_a_small_matrix_is_driven_goes_on_where_it_was_and_shows_what_is_missing
 
 
 @pytest.mark.exhaustive
-def test_a_ranking_that_was_killed_goes_on_where_it_was(tmp_path, capsys):
-    file, out = tmp_path / "small.yaml", tmp_path / "out"
-    file.write_text(SMALL)
-    program = "import sys; from yawbench.cli import main; main(sys.argv[1:])"
-    command = [sys.executable, "-c", program, "rank", str(file), "--out", str(out), "--jobs", "1"]
-    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, cwd=ROOT) as process:
-        assert process.stderr is not None
-        next(line for line in process.stderr if line.startswith("[1/4]"))
-        process.kill()
-    assert not (out / "table.csv").exists()
-    assert status_of("rank", file, "--out", out) == 0
-    told = capsys.readouterr().err
-    assert re.search(r"small: 4 runs, [123] finished already", told), told
-    assert [one["missing"] for one in rows(out / "table.csv")] == ["0", "0"]
-
-
-@pytest.mark.exhaustive
 def test_noisy_sensors_give_a_headroom_with_its_confidence(tmp_path):
     options = ("--condition", "saloon75_sensors", "--quick", "--only", "sliding_mode", "--out", tmp_path)
     assert status_of("rank", GROUND / "ranking.yaml", *options) == 0
@@ -263,19 +223,3 @@ def test_what_is_wrong_with_a_ranking_is_said_before_any_run(wrong, options, nam
     assert status_of("rank", file, "--out", tmp_path / "out", *options) in (1, 2)
     assert mentions(capsys.readouterr().err, *names)
     assert not list(tmp_path.rglob("run.json"))
-
-
-def test_the_ranking_of_the_proving_ground_is_as_large_as_it_says():
-    ranking = load_ranking(GROUND / "ranking.yaml")
-    assert len(ranking.spec.entries) >= 11
-    assert len(ranking.conditions) >= 12
-    quick = load_ranking(GROUND / "ranking.yaml", quick=True)
-    assert 1 < len(quick.conditions) < len(ranking.conditions)
-
-
-@pytest.mark.parametrize("name", load_ranking(GROUND / "ranking.yaml").spec.conditions)
-def test_brakes_get_no_help_from_a_drive_without_lag(name):
-    """Whoever brakes by hydraulics has an allocator that never drives a wheel."""
-    ranking = load_ranking(GROUND / "ranking.yaml")
-    text = (GROUND / ranking.spec.conditions[name].scenario).read_text()
-    assert ("wheel_control_hydraulic" in text) != ("allocator_load_proportional" in text)

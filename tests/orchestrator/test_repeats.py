@@ -117,11 +117,6 @@ def test_numbers_over_repeats_are_means_with_their_confidence(findings):
     assert findings.derived["share/right/noisy"].half == pytest.approx(over.half)
 
 
-def test_a_grid_with_rows_in_order_is_drawn_as_lines(findings):
-    lines = draw_over_axes(findings, findings.spec.figures[0]).axes[0].lines
-    assert [line.get_linestyle() for line in lines if line.get_marker() != "None"] == ["-", "--"]
-
-
 def test_tables_have_a_row_for_all_repeats_together(findings):
     (table,) = run_tables(findings)
     assert [row[0] for row in table.text()] == [

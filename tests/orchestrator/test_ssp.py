@@ -155,12 +155,6 @@ def test_an_archive_is_valid_against_the_schemas_of_ssp(scenario, standard, adap
     assert sources <= held
 
 
-def test_equal_plans_give_equal_bytes(fmus, tmp_path):
-    for name in ("one.ssp", "two.ssp"):
-        write_ssp(plan_of(SCENARIOS / PAPERS[0], fmus), tmp_path / name)
-    assert (tmp_path / "one.ssp").read_bytes() == (tmp_path / "two.ssp").read_bytes()
-
-
 def test_the_command_exports_and_run_runs_what_it_exports(fmus, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     scenario, folder = str(SCENARIOS / PAPERS[3]), str(fmus)
@@ -174,15 +168,6 @@ def test_the_command_exports_and_run_runs_what_it_exports(fmus, tmp_path, monkey
         assert not exit_.value.code
     numbers = [(tmp_path / name / "results.csv").read_bytes() for name in ("from_ssp", "from_yaml")]
     assert numbers[0] == numbers[1]
-
-
-@pytest.mark.exhaustive
-def test_runs_of_an_archive_are_compared(feedback, fmus, tmp_path):
-    short, swap = ["--set", "stop_time=0.1"], ["--swap", "controller=controller_off"]
-    with pytest.raises(SystemExit) as exit_:
-        main(["compare", str(feedback), *swap, *short, "--fmus", str(fmus), "--out", str(tmp_path / "c")])
-    assert not exit_.value.code
-    assert "controller_off" in (tmp_path / "c" / "report.html").read_text()
 
 
 def test_units_of_an_archive_are_swapped_and_set_as_those_of_a_scenario(feedback, fmus, tmp_path):
@@ -309,7 +294,6 @@ def test_a_parameter_in_another_unit_is_converted(feedback, fmus, tmp_path, unit
     assert unit_of(make_plan(load_scenario(path), fmus=fmus), "plant").parameters["initial_speed"] == 25.0
 
 
-OUTERMOST = '<ssd:System name="system">'
 SPEED_MAPPED = (
     f'<ssm:ParameterMapping xmlns:ssm="{SSM}" version="1.0">'
     '<ssm:MappingEntry source="car.speed" target="plant.initial_speed">{}</ssm:MappingEntry>'

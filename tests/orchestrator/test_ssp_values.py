@@ -306,20 +306,6 @@ def test_of_several_descriptions_it_is_said_which_is_taken_and_how_to_take_anoth
     assert "fast.ssd" in str(problem(path / "slow.ssd"))
 
 
-def test_a_variant_is_run_by_its_path(library, tmp_path, capsys):
-    from .test_foreign import write_fmu
-
-    write_fmu(tmp_path / "g.fmu", library, "Real")
-    texts = [
-        description(inline(parameters(parameter("g.Real_in", f'<ssv:Real value="{i}"/>')))) for i in (1, 2)
-    ]
-    path, out = pack(tmp_path, texts[0], {"fast.ssd": texts[1]}), tmp_path / "out"
-    with pytest.raises(SystemExit) as exit_:
-        main(["run", str(path / "fast.ssd"), "--set", "step_size=0.1", "--out", str(out)])
-    assert not exit_.value.code, capsys.readouterr().err
-    assert (out / "results.csv").read_text().split()[-1].endswith(",4.0")
-
-
 def test_an_archive_without_the_default_description_names_the_others(tmp_path):
     path = tmp_path / "s.ssp"
     with zipfile.ZipFile(path, "w") as archive:

@@ -12,10 +12,8 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from lxml import html
-from rich.console import Console
 
 from tests.refusals import each_mentions, mentions, refused, texts_of
-from yawbench.figures.display import shown
 from yawbench.foundation.errors import Diagnostic, ScenarioError
 from yawbench.metrics.expressions import MetricValue
 from yawbench.orchestrator.plan import Override
@@ -31,7 +29,6 @@ from yawbench.studies.load_experiment import load_experiment
 from yawbench.studies.result_figures import draw_all, draw_over_axes
 from yawbench.studies.result_files import write_findings
 from yawbench.studies.result_tables import claim_tables, derived_tables, measured_words, run_tables, share
-from yawbench.studies.tables import Table, for_terminal
 
 from .recorded import car, write
 
@@ -169,19 +166,6 @@ def test_numbers_that_decide_a_verdict_read_differently(value, bound, expected):
     assert found == (value < bound, [expected])
 
 
-def test_a_number_beside_a_threshold_that_it_misses_by_little_is_told_from_it():
-    claim = Claim.model_validate(
-        {"says": "No more.", "holds_if": [{"run": "a", "metric": "x", "at_most": "5 %"}]}
-    )
-    found = judged(claim, {("a", "x"): MetricValue(0.0500004, "%")}, {"a": "held"})
-    assert found == (False, ["5.00004 % (held)"])
-    angle = Claim.model_validate(
-        {"says": "No more.", "holds_if": [{"run": "a", "metric": "x", "at_most": "0.0002 deg"}]}
-    )
-    _, (text,) = judged(angle, {("a", "x"): MetricValue(np.radians(3e-4), "rad")}, {"a": "held"})
-    assert not text.startswith("<")
-
-
 def test_a_margin_beyond_the_threshold_itself_is_told_in_words():
     assert [share(x) for x in (0.016, -0.5, 1.0, -1.0, 1.01, -62.29, math.inf, -math.inf)] == [
         "1.6 %",
@@ -235,15 +219,6 @@ def test_for_stands_for_one_run_per_combination(study, tmp_path):
         Override.of("controller", "controller_fnn", "study"),
     )
     assert (runs["slow"].label, runs["slow"].row) == ("slow", "slow")
-
-
-def test_a_run_becomes_a_case_with_its_overrides(study):
-    *_, case = study().cases
-    assert case.run.name == "slow"
-    assert case.changes == (
-        Override.of("stop_time", 2.0, "study"),
-        Override.of("algorithm", "jacobi", "study"),
-    )
 
 
 def test_an_fmu_given_by_its_path_is_relative_to_the_study_file(study, tmp_path):
@@ -377,17 +352,6 @@ def test_operators_and_factors_compare_as_they_say():
         holds(below="2 deg")
 
 
-def test_conditions_can_be_read():
-    claim = Claim(
-        says="x",
-        holds_if=[
-            {"run": "a", "metric": "m", "at_most": "5 %"},
-            {"run": "a", "metric": "m", "below": {"run": "b", "metric": "n", "times": 0.5}},
-        ],
-    )
-    assert [str(c) for c in claim.holds_if] == ["a: m ≤ 5 %", "a: m < 0.5 × n of b"]
-
-
 @pytest.fixture
 def with_grid(study):
     """The study with a grid of its four runs, derived numbers and claims about them."""
@@ -474,33 +438,6 @@ def test_a_derived_number_stands_beside_the_published_one(with_grid, out):
     assert record["derived"]["order"]["published"] is None
 
 
-def test_without_a_run_there_is_neither_correlation_nor_verdict(with_grid, out):
-    lost = Outcome(
-        Job("15mps/off", Path("x"), out / "15mps/off"), (Diagnostic("run-failed", "plant: lost"),), 1
-    )
-    findings = judge_results(with_grid(), out, [lost])
-    assert findings.derived == {}
-    assert findings.checks[0].verdict.holds is None
-    grid, numbers = derived_tables(findings)
-    assert grid.text()[0] == ["15", "-", "0.0200", "15", "3.00", "0.0100"]
-    assert mentions(grid.notes[1], "Spearman", "5 runs")
-    assert numbers.text() == [["Rank correlation", "-"], ["Share of the error removed", "-"]]
-
-
-def test_a_grid_without_published_numbers_is_a_plain_table(with_grid, out):
-    study = with_grid(
-        ("    published: [[3, 0.01], [2, 0.05]]\n", ""),
-        (", published: 0.001", ""),
-        ("  order: {says: Rank correlation, rank_correlation: errors}\n", ""),
-        ("{derived: order, at_least: 0.9}", "{derived: drop, at_least: 90 %}"),
-    )
-    findings = judge_results(study, out)
-    grid, _ = derived_tables(findings)
-    assert grid.text() == [["15", "1.40", "0.0200"], ["25", "2.00", "0.0400"]]
-    assert len(grid.notes) == 1
-    assert findings.checks[0].verdict.holds
-
-
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
@@ -547,27 +484,6 @@ def test_what_is_wrong_with_grids_and_derived_numbers_is_said(with_grid, old, ne
     with pytest.raises(ScenarioError) as error:
         with_grid((old, new))
     assert any(said in problem for problem in texts_of(error.value)), texts_of(error.value)
-
-
-def test_a_long_heading_over_numbers_is_broken_on_the_terminal():
-    table = Table(
-        "", ["run", "controller_sliding_mode switching=saturation"], [["a", MetricValue(1.0, "N.m")]]
-    )
-    console = Console(width=140)
-    with console.capture() as printed:
-        console.print(for_terminal(table))
-    first, second = printed.get().splitlines()[:2]
-    assert (first.split(), second.split()) == (["controller_sliding_mode"], ["run", "switching=saturation"])
-
-
-def test_notes_below_a_narrow_table_take_the_width_of_the_terminal():
-    note = "No number for settling_time(acceleration_y), peak(slip_ratio_*)."
-    console = Console(width=80)
-    with console.capture() as printed:
-        console.print(for_terminal(Table("A title that is wider than the table", ["m"], [["1"]], [note])))
-    lines = [line.rstrip() for line in printed.get().splitlines()]
-    assert mentions(lines[0], "title", "wider", "table")
-    assert lines[-1] == note
 
 
 def test_expressions_are_arithmetic():
@@ -642,29 +558,6 @@ def test_a_study_without_any_result_still_says_so(study, tmp_path):
     _, said = draw_all(findings, tmp_path / "empty")
     assert each_mentions(said, ("figure", "results"), ("figure", "roll", "results"))
     assert mentions(page(findings, tmp_path / "empty"), "5 runs")
-
-
-def test_an_angle_below_what_can_be_told_is_shown_as_such():
-    assert shown(7.6e-11, "rad") == "< 0.001 °"
-    assert shown(-1e-9, "rad/s") == "< 0.001 °/s"
-    assert (shown(0.0, "rad"), shown(2e-5, "rad"), shown(1e-9, "%")) == ("0 °", "0.00115 °", "1.00e-07 %")
-
-
-def test_the_studies_of_paper_b_are_right_in_themselves():
-    folder = Path(__file__).parents[2] / "scenarios" / "fuzzy_sliding_mode"
-    study, distribution = (
-        load_experiment(folder / "study.yaml"),
-        load_experiment(folder / "distribution.yaml"),
-    )
-    assert len(distribution.runs) == 3 * 26
-    for run in (*study.runs.values(), *distribution.runs.values()):
-        assert run.scenario.is_file()
-
-
-def test_the_study_of_paper_a_is_right_in_itself():
-    study = load_experiment(Path(__file__).parents[2] / "scenarios" / "fnn_sideslip" / "study.yaml")
-    assert {f"{v}mps/{c}" for v in (15, 25, 40) for c in ("off", "fuzzy_sideslip", "fnn")} <= set(study.runs)
-    assert all(run.scenario.is_file() for run in study.runs.values())
 
 
 def test_a_rank_correlation_may_be_that_of_part_of_a_grid():

@@ -177,19 +177,6 @@ def test_one_row_per_run_with_units_and_figures_and_a_page(moods, yawbench, tmp_
     assert len(list(csv.DictReader((tmp_path / "out" / "table.csv").open()))) == 6
 
 
-@pytest.mark.filterwarnings("error")
-def test_a_sweep_with_a_stop_time_of_its_own_tells_it_in_the_table_and_warns_of_nothing(
-    moods, yawbench, tmp_path
-):
-    file = moods(10)
-    file.write_text(file.read_text() + "stop_time: 0.05\n")
-    status, _, err = yawbench(file, "out")
-    assert status == 0, err
-    assert "Warning" not in err
-    about = json.loads(pq.read_schema(tmp_path / "out" / "table.parquet").metadata[b"experiment"])
-    assert about["experiment"]["stop_time"] == 0.05
-
-
 @pytest.mark.exhaustive
 def test_the_table_is_the_same_to_the_byte_however_many_workers(moods, yawbench, tmp_path):
     file = moods(5, 20, count=2)
@@ -301,33 +288,12 @@ def test_a_run_whose_process_is_killed_is_made_again(level, moods, yawbench, tmp
     assert [row["moment"] for row in rows(tmp_path / "out")] == pytest.approx([1, 1, level / 10, level / 10])
 
 
-@pytest.mark.exhaustive
-def test_a_run_that_kills_its_process_every_time_is_named_and_tried_again_next_time(
-    moods, yawbench, tmp_path
-):
-    file = moods(10, 30)
-    assert yawbench(file, "out")[0] == 1
-    found = rows(tmp_path / "out")
-    assert [row["status"] for row in found] == ["completed"] * 2 + ["failed"] * 2
-    assert mentions(found[2]["reason"], "SIGKILL", "process")
-    assert len(journal(tmp_path / "out")) == 2
-    assert "4 runs, 2 finished already" in yawbench(file, "out")[2]
-
-
 def test_more_levels_add_runs_and_repeat_none(moods, yawbench, tmp_path):
     yawbench(moods(10), "out")
     assert mentions(yawbench(moods(10, 15), "out")[2], "4 runs", "2", "finished")
     assert len({entry["key"] for entry in journal(tmp_path / "out")}) == len(journal(tmp_path / "out")) == 4
     yawbench(moods(10, 15), "anew")
     assert rows(tmp_path / "out") == rows(tmp_path / "anew")
-
-
-@pytest.mark.exhaustive
-def test_fresh_makes_all_runs_again(moods, yawbench, tmp_path):
-    file = moods(10)
-    yawbench(file, "out")
-    assert "finished already" not in yawbench(file, "out", "--fresh")[2]
-    assert len(journal(tmp_path / "out")) == 2
 
 
 def test_kept_results_can_be_loaded_in_every_format_and_are_made_once(moods, yawbench, tmp_path):
@@ -552,26 +518,3 @@ def test_runs_that_were_never_made_are_not_called_failed(moods, yawbench, tmp_pa
     assert (status, "not made" in out + said) == (1, False)
     assert "level 20" in said
     assert "failed: controller" in said
-
-
-def test_every_count_on_the_page_of_a_sweep_is_that_of_its_runs(moods, yawbench, tmp_path):
-    assert yawbench(moods(1, 20, count=3), "out")[0] == 1
-    page = page_of(tmp_path / "out")
-    told = {
-        words_of(one).split()[0]: int(words_of(one).split()[-1])
-        for one in page.xpath("//details[@class='group']/summary")
-        if words_of(one).startswith(("Runs", "FMUs"))
-    }
-    rows = list(csv.DictReader((tmp_path / "out" / "table.csv").open()))
-    assert told == {"Runs": len(rows), "FMUs": 2}
-    fmus = page.xpath("//table[@class='fmus']/tbody/tr")
-    assert len(fmus) == told["FMUs"]
-    (runs,) = page.xpath("//table[@class='runs']")
-    headings = [words_of(one) for one in runs.xpath("./thead/tr/th")]
-    (cells,) = ([words_of(one) for one in row] for row in runs.xpath("./tbody/tr"))
-    counts = dict(zip(headings, cells, strict=True))
-    assert {key: counts[key] for key in ("completed", "failed")} == {
-        status: str(sum(row["status"] == status for row in rows)) for status in ("completed", "failed")
-    }
-    assert f"({len(rows)} runs)" in words_of(page)
-    assert "yawbench 0" in words_of(page).partition("How to reproduce this")[2].partition("Made by")[0]

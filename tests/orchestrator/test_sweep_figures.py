@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
 from tests.refusals import each_mentions, mentions, refused
 from yawbench.foundation.errors import Diagnostic, ResultsError
-from yawbench.studies.axis_figures import boundary, edges
 from yawbench.studies.experiment import PlannedExperiment
 from yawbench.studies.experiment_result import ExperimentResult
 from yawbench.studies.jobs import Job, MeasuredRun, measured
@@ -210,15 +208,3 @@ def test_equal_sweeps_give_equal_tables_to_the_byte(swept, tmp_path):
     assert table["sideslip"].null_count == 1
     assert [why for why in table["reason"].to_pylist() if why] == ["plant: it failed"]
     assert table.schema.field("sideslip").metadata[b"metric"] == b"peak(sideslip)"
-
-
-def test_edges_of_cells_lie_halfway_between_their_centres():
-    assert edges([1.0, 2.0, 4.0], log=False).tolist() == [0.5, 1.5, 3.0, 5.0]
-    assert edges([1.0, 100.0], log=True) == pytest.approx([0.1, 10.0, 1000.0])
-    assert edges([3.0], log=False).tolist() == [2.5, 3.5]
-
-
-def test_a_boundary_runs_between_cells_beyond_and_cells_that_are_not():
-    beyond = np.array([[False, True], [True, True]])
-    found = boundary(beyond, np.array([0.0, 1.0, 2.0]), np.array([0.0, 1.0, 2.0]))
-    assert sorted(found) == [((0.0, 1.0), (1.0, 1.0)), ((1.0, 1.0), (0.0, 1.0))]

@@ -15,81 +15,16 @@ from pathlib import Path
 import pytest
 from rich.cells import cell_len
 
-import yawbench as yb
-from tests.commands import status_of
 from yawbench.commands import output
-from yawbench.foundation import plugins
 from yawbench.metrics.expressions import MetricValue
 from yawbench.studies import tables
 from yawbench.studies.tables import Table
 
-from .test_batch_commands import SCENARIO, STUDY
-from .test_dry_run import TUNING
 from .test_fit import folder as fitted  # noqa: F401 - a fixture
-from .test_output import SWEEP
-from .test_ranking import SMALL as RANKING
-from .test_threats import RANKING as HARD
-from .test_threats import SMALL as THREATS
-from .test_validation import line
 
 ROOT = Path(__file__).parents[2]
 WIDTHS = (80, 100, 120)
 WIDE = 400
-METRICS = """
-  effort: {metric: effort(yaw_moment), heading: effort of the controller over the whole run}
-  chatter: {metric: total_variation_rate(yaw_moment), heading: chatter of the moment}
-  wanted: {metric: rms(yaw_rate_ref), heading: mean square of the wanted yaw rate}
-  angle: {metric: peak(steer_angle), heading: largest steer angle}
-  area: {metric: effort(steer_angle), heading: area below the steer angle}
-"""
-LIMITS = """
-limits:
-  gentle: {says: Highest speed at which little is asked for, of: speed,
-    holds_if: [{metric: moment, below: 1e9}]}
-"""
-SHORT = ("fnn_sideslip/25mps", "--set", "stop_time=1.5", "--fmus", "FMUS")
-SWAPS = ("--swap", "controller=controller_off,controller_fnn,controller_pid,controller_fuzzy_sideslip")
-COARSE = ("--set", "step_size=0.005", "--fmus", "FMUS")
-JOBS = {
-    **{f"list {what}": [["list", what]] for what in ("scenarios", "vehicles", "metrics")},
-    **{f"list {what}": [["list", what, "--fmus", "FMUS"]] for what in ("signals", "fmus")},
-    "list": [["list"]],
-    "list --units": [["list", "--units", "--fmus", "FMUS"]],
-    "list signals of a scenario": [["list", "signals", "fnn_sideslip/25mps", "--fmus", "FMUS"]],
-    "check": [["check", "real_signals/told_fnn", "--all", "--fmus", "FMUS"]],
-    "check with faults": [["check", *SHORT, "--fault", "plant.yaw_rate: bias 3 deg/s from 1 s"]],
-    "run, list runs, diff": [
-        ["run", *SHORT, "--metric", "standard", "--out", "runs/one of several runs with a long name"],
-        ["run", *SHORT, "--metric", "standard", "--set", "plant.mass=1234.567", "--out", "runs/two"],
-        ["list", "runs", "runs"],
-        ["diff", "runs/one of several runs with a long name", "runs/two"],
-    ],
-    "compare": [["compare", *SHORT, *SWAPS]],
-    "converge": [["converge", *SHORT, "--halvings", "2"]],
-    "study": [["study", "study.yaml", "--fmus", "FMUS"]],
-    "report": [["report", "study.yaml", "--fmus", "FMUS"]],
-    "report of a paper": [["report", "fuzzy_feedback/study", "--no-run", "--fmus", "FMUS"]],
-    "sweep": [["sweep", "sweep.yaml", "--fmus", "FMUS"]],
-    "dry run": [["sweep", "sweep.yaml", "--dry-run", "--fmus", "FMUS"]],
-    "tune": [["tune", "tuning.yaml", "--fmus", "FMUS"]],
-    "evaluate": [["evaluate", "step-steer", "step.yaml", "--no-figures"]],
-    "evaluate several runs": [
-        ["run", "proving_ground/lift_off_in_turn", *COARSE, "--out", "turns/a"],
-        ["run", "proving_ground/lift_off_in_turn", *COARSE, "--set", "plant.mass=2000", "--out", "turns/b"],
-        ["evaluate", "turn-response", "turns", "--no-figures"],
-    ],
-    "measured show": [["measured", "show", "step.yaml"]],
-    "vehicle show": [["vehicle", "show", "mid_size", "--plant", "plant_seven_dof", "--fmus", "FMUS"]],
-    "validate": [["validate", "turn", "--measured", "near.yaml", "--out", "v"]],
-    "fit": [["fit", "FITTED/fit.yaml", "--out", "fit", "--jobs", "1"]],
-    "drive": [["drive", "sine-with-dwell", *COARSE, "--angle", "180 deg", "--out", "d"]],
-    "rank": [["rank", "ranking.yaml", "--jobs", "2"]],
-    "rank by threats": [["rank", "threats.yaml", "--jobs", "2"]],
-}  # fmt: skip
-"""Command lines whose tables are printed, by name; the last ones take long."""
-LONG = ("fit", "drive", "rank", "rank by threats")
-WITHOUT = {"second-opinion"}
-"""Commands that need programs of others."""
 
 
 @pytest.fixture
@@ -106,46 +41,6 @@ def printed(monkeypatch, capsys):
     return text_of
 
 
-@pytest.fixture
-def tables_of(monkeypatch, tmp_path, request, capsys):
-    """Return the tables that commands print in a folder with files of many kinds."""
-    found: list[Table] = []
-
-    class Recorded(tables.TerminalTable):
-        def __init__(self, table: Table) -> None:
-            super().__init__(table)
-            found.append(table)
-
-    monkeypatch.setattr(tables, "for_terminal", Recorded)
-    monkeypatch.chdir(tmp_path)
-    files = {
-        "half": SCENARIO, "study": STUDY.replace("\ntables:", METRICS + "tables:"), "tuning": TUNING,
-        "sweep": SWEEP + METRICS.lstrip("\n") + LIMITS, "ranking": RANKING,
-        "threats": THREATS.replace("ranking.yaml", "hard.yaml"), "hard": HARD,
-    }  # fmt: skip
-    for name, text in files.items():
-        Path(f"{name}.yaml").write_text(text, encoding="utf-8")
-    rows = [f"{k / 100},{0.5 * (k > 100)},{0.2 * (k > 120)},{4.0 * (k > 130)},25\n" for k in range(500)]
-    Path("step.csv").write_text("time [s],delta [rad],r [rad/s],ay [m/s2],v [m/s]\n" + "".join(rows))
-    signals = "steering_wheel_angle: delta, yaw_rate: r, acceleration_y: ay, velocity_x: v"
-    Path("step.yaml").write_text(f"files: [step.csv]\nsignals: {{{signals}}}\n")
-    yb.measured(line(tmp_path, "turn"), segment=1).save(tmp_path / "turn")
-    line(tmp_path, "near", up=0.05)
-
-    def call(commands: list[list[str]]) -> list[Table]:
-        for command in commands:
-            places = {"FMUS": str(ROOT / "fmus")}
-            if any("FITTED" in word for word in command):
-                places["FITTED"] = str(request.getfixturevalue("fitted"))
-            for name, place in places.items():
-                command = [word.replace(name, place) for word in command]
-            status = status_of(*command)
-            assert status in (0, 1), capsys.readouterr().err
-        return [*found]
-
-    return call
-
-
 def assert_whole(table: Table, printed) -> None:
     """Assert that all words, names and numbers of a table are whole at every width."""
     wide = {*printed(WIDE, [table]).split()}
@@ -160,21 +55,6 @@ def assert_whole(table: Table, printed) -> None:
                 if cell_len(text) <= (32 if table.is_number(k) else 20 if k else width // 2):
                     assert any(text in row for row in lines), (width, text)
     assert words <= {*printed(40, [table]).split()}
-
-
-@pytest.mark.parametrize(
-    "name", [*(pytest.param(name, marks=[pytest.mark.exhaustive] * (name in LONG)) for name in JOBS)]
-)
-def test_tables_of_every_command_are_whole_at_every_width(name, tables_of, printed):
-    found = tables_of(JOBS[name])
-    assert found
-    for table in found:
-        assert_whole(table, printed)
-
-
-def test_every_command_with_tables_is_among_them():
-    tabular = {n for n in plugins.names("command") if hasattr(plugins.find("command", n), "tabular")}
-    assert {command[0] for commands in JOBS.values() for command in commands} | WITHOUT == tabular
 
 
 ODD = Table(

@@ -107,23 +107,6 @@ def test_everything_made_of_a_run_names_all_that_was_changed(yawbench, tmp_path,
         assert [words for words in WORDS if words not in text] == [], name
 
 
-@pytest.mark.exhaustive
-def test_the_figure_of_a_sweep_names_what_options_changed(yawbench, fmus, tmp_path):
-
-    from tests.changed import changed as given
-    from yawbench.studies.experiment import plan_experiment
-    from yawbench.studies.experiment_result import judge_records
-    from yawbench.studies.jobs import MeasuredRun
-    from yawbench.studies.load_experiment import load_experiment
-
-    (tmp_path / "sweep.yaml").write_text(SWEEP)
-    sweep = load_experiment(tmp_path / "sweep.yaml", changes=given(settings=["inputs.friction*=0.3"]))
-    planned = plan_experiment(sweep, tmp_path, fmus=fmus)
-    records = {job.key: MeasuredRun({"sideslip": (0.1, "rad")}) for job in planned.jobs}
-    figure = result_files.draw_over_axes(judge_records(planned, records), sweep.spec.figures[0])
-    assert mentions(texts(figure), "inputs.friction*", "0.3")
-
-
 def made(*changes):
     """Return a made-up run whose record names changes."""
     results = car()

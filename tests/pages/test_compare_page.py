@@ -103,19 +103,6 @@ def test_a_row_of_samples_takes_few_bytes_of_the_page(page):
     assert len(text.encode()) - size_without_samples(text) <= 15 * sum(rows)
 
 
-@pytest.mark.exhaustive
-def test_the_page_of_four_runs_of_eight_seconds_keeps_its_budget(tmp_path, fmus):
-    laws = "controller_off,controller_fuzzy_sideslip,controller_fnn,controller_fnn:learning=false"
-    scenario = str(ROOT / "scenarios/fnn_sideslip/25mps.yaml")
-    with pytest.raises(SystemExit) as ended:
-        main(["compare", scenario, "--swap", f"controller={laws}", "--out", str(tmp_path / "out")])
-    assert not ended.value.code
-    page = tmp_path / "out/report.html"
-    runs = data_in(page.read_text(encoding="utf-8"))["runs"]
-    assert [run["rows"] for run in runs] == 4 * [8001]
-    assert page.stat().st_size <= 1_200_000
-
-
 def test_the_viewer_comes_first_with_the_signals_that_differ_most(chromium, page):
     chromium.open(page, calm=False)
     chromium.wait_for("document.querySelector('.yv-ready')")

@@ -258,17 +258,3 @@ def test_the_record_names_file_and_line_of_every_given_value(folder):
                 assert (source.file, source.line) == ("", 0)
     assert record.source("driver", "amplitude") == ValueSource("varied", "--set")
     assert record.source("controller", "learning_rate") is None
-
-
-def test_older_records_say_that_the_source_is_not_recorded(folder):
-    _, plan = planned(folder)
-    old = json.loads(run_record(plan, status="", started=NOW).to_json())
-    del old["sources"], old["scenario"]["vehicle_title"], old["scenario"]["vehicle_source"]
-    for fmu in old["fmus"].values():
-        del fmu["sources"]
-    groups = {one.title: one for one in groups_of([(RunRecord.model_validate(old), plan)])}
-    assert mentions(groups["The car: car"].below, "car.yaml", "source")
-    driver = groups["driver: driver_sine"].parameters
-    assert driver["frequency"].origin == ValueSource(NEUTRAL, "source not recorded")
-    learning = groups["controller: controller_fnn"].parameters["learning_rate"]
-    assert learning.origin == ValueSource(PAPER, "paper A, equation (35)")  # as its FMU says

@@ -6,17 +6,13 @@ import shutil
 from pathlib import Path
 
 import pytest
-from lxml import html
 
 from tests.orchestrator.test_ranking import SMALL
 from yawbench.cli import main
-from yawbench.ranking.ranking import load_ranking
 from yawbench.ranking.ranking_page import result_of_threats
 
 from .browser import DESK, HELD, PHONE, Browser
 from .flaws import flaws_in_print, inaccessible, looks
-from .made_up import unpacked
-from .test_sweep_page import MOST_ELEMENTS
 
 RANKING = Path(__file__).parents[2] / "scenarios/proving_ground/ranking.yaml"
 
@@ -54,28 +50,6 @@ def test_the_first_cell_is_open_and_all_of_it_can_be_read_by_everyone(
     assert top >= bar  # the heading of what was chosen is not behind the links at the top
 
 
-def test_the_whole_ranking_would_keep_its_budgets(chromium: Browser, page):
-    whole = load_ranking(RANKING)
-    entries, cells = len(whole.entries), len(whole.entries) * len(whole.conditions)
-    text, tree = page.read_text(encoding="utf-8"), html.fromstring(unpacked(page))
-    size, elements = len(text.encode()), len(tree.xpath("//*[not(ancestor::template)]"))
-    rows = tree.xpath("//tr[not(ancestor::template)]")
-    a_cell, a_row = tree.cssselect("td.cell")[0], max(rows, key=lambda row: len(html.tostring(row)))
-    assert size + cells * len(html.tostring(a_cell)) + 3 * entries * len(html.tostring(a_row)) <= 400_000
-    assert elements + 2 * cells + 2 * entries * len(a_row.xpath(".//*")) <= MOST_ELEMENTS
-
-
-def test_every_count_is_that_of_its_table(page):
-    tree = html.fromstring(unpacked(page))
-    rows = tree.cssselect("table.matrix tbody tr")
-    conditions = tree.cssselect("table.matrix th.leaning")
-    answer = tree.xpath("string(//p[@class='said'])")
-    assert answer.startswith(f"Of {len(rows)} controllers")
-    assert f"of {len(conditions)} conditions" in answer
-    assert len(tree.cssselect("td.cell")) == len(rows) * len(conditions)
-    assert len(list((page.parent / "data").glob("*.js"))) == len(rows) * len(conditions)
-
-
 def test_threats_are_quoted_where_they_can_be_read(tmp_path):
     assert "is clear in" in result_of_threats(RANKING.parent / "threats.yaml")
     assert result_of_threats(tmp_path / "threats.yaml") == ""
@@ -101,37 +75,6 @@ CHOSEN = (
     "const chosen = document.querySelector('.chosen'), links = [...document.querySelectorAll('td.cell a')];"
 )
 PANELS = "return document.querySelector('.chosen .yv').viewer.state.panels"
-
-
-def test_a_late_error_does_not_replace_what_was_chosen_after_it(chromium: Browser, page):
-    chromium.open(page)
-    chromium.wait_for("document.querySelector('.chosen .yv-ready')")
-    details = chromium.run(
-        HELD + CHOSEN + "const first = await choose(links[1]), second = await choose(links[2]);"
-        "end(second); await until(() => chosen.querySelector('.yv-ready'));"
-        "fail(first); await frames();"
-        "return document.querySelector('.details').textContent"
-    )
-    assert details and "belongs beside this page" not in details
-    assert chromium.run(CHOSEN + "return Boolean(chosen.querySelector('.yv-ready'))")
-    assert chromium.console() == []
-
-
-def test_what_the_viewer_writes_while_the_next_run_is_loaded_is_not_taken_for_the_wish_of_a_link(
-    chromium: Browser, page
-):
-    chromium.open(page)
-    chromium.wait_for("document.querySelector('.chosen .yv-ready')")
-    at_first = chromium.run(PANELS)
-    chromium.run(
-        HELD + CHOSEN + "const {viewer} = chosen.querySelector('.yv');"
-        "const {panels} = viewer.state, wish = JSON.stringify(panels.slice(0, 1));"
-        "location.hash = `${links[1].hash}&&${viewer.key}?panels=${wish}`; await until(() => held.length);"
-        "viewer.state.panels = panels.slice(0, 2); viewer.remember();"
-        "end(held[0]); await until(() => chosen.querySelector('.yv').viewer !== viewer);"
-        "await until(() => chosen.querySelector('.yv-ready'));"
-    )
-    assert chromium.run(PANELS) == at_first[:1]
 
 
 def test_of_two_quick_choices_the_last_is_shown_with_the_panels_of_the_viewer_before(chromium: Browser, page):

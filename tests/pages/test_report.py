@@ -143,14 +143,6 @@ def test_every_figure_of_the_study_is_a_view_of_the_page_and_a_file(paper):
     assert all(any(view["title"].startswith(title) for title in titles) for view in views)
 
 
-def test_the_panels_stand_in_the_order_of_the_study(paper):
-    spec = next(one for one in load_experiment(paper.study).spec.figures if one.kind == "overlay")
-    views = data_in(paper.page.read_text(encoding="utf-8"))["views"]
-    view = next(one for one in views if one["title"] == paper.record["figures"][spec.name])
-    shown = [panel.partition(".")[2].partition(",")[0] for panel in view["panels"]]
-    assert shown[:2] == [name for name in spec.panels if "(" not in name and name != "path"][:2]
-
-
 def test_the_answer_comes_first_and_a_claim_shows_its_runs(chromium, paper):
     chromium.open(paper.page)
     chromium.wait_for("document.querySelector('.yv-ready')")
@@ -181,42 +173,6 @@ def test_the_answer_and_the_first_curve_are_on_the_first_screen(chromium, paper,
     check_first_screen(chromium, paper.page, width, height)
 
 
-def test_the_pages_of_all_studies_would_keep_their_budget_of_elements(chromium, paper):
-    chromium.open(paper.page)
-    chromium.wait_for("document.querySelector('.yv-ready')")
-    elements, row, claim = chromium.run(
-        "const sizes = (name) => [...document.querySelectorAll(name)]"
-        "  .map((each) => each.querySelectorAll('*').length + 1);"
-        "const hidden = sizes('.yv-runs tr:has(.yv-show:not(:checked))');"
-        "return [sizes('html')[0], Math.max(...hidden), Math.max(...sizes('.claims > tbody > tr'))]"
-    )
-    own = load_experiment(paper.study)
-    for file in found_studies(ROOT / "scenarios"):
-        study = load_experiment(file)
-        runs = 0 if study.spec.axes else len(study.runs) - len(own.runs)  # axes: its runs are in no table
-        assert elements + runs * row + (judgements(study) - judgements(own)) * claim <= 2000, file
-
-
-def judgements(study):
-    """Return the number of claims and checks."""
-    return len(study.spec.claims) + len(study.spec.checks)
-
-
-def test_every_count_is_that_of_its_table(paper):
-    folded = [
-        (int(count.text), len(details.xpath(".//tbody/tr")))
-        for details in paper.tree.cssselect("details.group")
-        for count in details.xpath("summary/small")
-    ]
-    assert len(folded) > 5
-    assert all(count == rows for count, rows in folded)
-    answer = paper.tree.xpath("string(//p[@class='said'])")
-    claims = len(paper.tree.cssselect("table.claims")[0].xpath("tbody/tr"))
-    assert answer.startswith(f"Of {claims} claims, ")
-    verdicts = paper.tree.cssselect("table.claims")[0].cssselect(".verdict.good")
-    assert f"{len(verdicts)} hold" in answer
-
-
 def test_parameters_tell_their_source(paper):
     every = paper.tree.cssselect("table.parameters tbody tr")  # the vehicle's first, then those of units
     rows = {row[0].text_content(): row for row in reversed(every)}
@@ -241,17 +197,6 @@ def test_nothing_is_cut_overlapping_or_empty_at_any_width(chromium, paper, width
     open_all(chromium)
     assert flaws(chromium) == []
     assert inaccessible(chromium, colours) == []
-
-
-@pytest.mark.parametrize("width", [PHONE, DESK])
-def test_the_system_can_be_read_at_every_width(chromium, paper, width):
-    chromium.open(paper.page, width=width)
-    size = chromium.run(
-        "const text = document.querySelector('.system svg text'); const svg = text.viewportElement;"
-        "const scale = svg.clientWidth / svg.viewBox.baseVal.width;"
-        "return scale * Number(text.getAttribute('font-size'))"
-    )
-    assert size > 11
 
 
 def test_in_print_everything_is_unfolded(chromium, paper):
@@ -320,25 +265,6 @@ def test_a_run_that_failed_is_named_and_its_claims_are_not_judged(report, half):
     assert mentions(tree.text_content(), "wheel", "came")
     verdicts = [text.split(maxsplit=1)[1] for text in texts(tree, "table.claims .verdict")]
     assert verdicts == ["not judged", "does not reproduce"]
-
-
-def test_many_failed_runs_are_folded(report, half):
-    (half / "study.yaml").write_text(HALF.replace("[0.02, 0.05]", "[0.02, 0.03, 0.04, 0.05, 0.06]"))
-    report()
-    for amplitude in ("0.02", "0.03", "0.04", "0.06"):
-        file = Path(f"results/half/study/amplitude/{amplitude}/run.json")
-        record = json.loads(file.read_text()) | {
-            "status": "failed",
-            "error": {"message": "the wheel came off"},
-        }
-        file.write_text(record_text(record))
-    assert report("--no-run")[0] == 1
-    page = unpacked(Path("results/half/study/report.html"))
-    (folded,) = html.fromstring(page).xpath("//details[summary/span[contains(., 'failed')]]")
-    assert " ".join(folded.find("summary").text_content().split()) == "✗ failed 4 of 5 runs"
-    assert page.count("the wheel came off") >= 4
-    first = html.fromstring(page).xpath("//h1/following-sibling::p[contains(., 'the wheel came off')]")
-    assert not first
 
 
 @pytest.fixture(scope="module")

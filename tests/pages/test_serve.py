@@ -13,7 +13,6 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
@@ -24,7 +23,6 @@ from tests.orchestrator.recorded import write
 from tests.refusals import each_mentions
 from yawbench.bench.server import ResultsServer
 from yawbench.bench.sliders import Bench, Superseded, Wanted, knobs_of, shown_first
-from yawbench.foundation.interrupts import StopFlag
 from yawbench.orchestrator.scenario import loader
 from yawbench.orchestrator.scenario.loader import find
 from yawbench.orchestrator.scenario.overrides import read_changes
@@ -34,7 +32,7 @@ from yawbench.reports.viewer import page
 from yawbench.studies.jobs import Job, planned
 from yawbench.vocabulary.vehicle import CAR
 
-from .browser import PHONE, Browser
+from .browser import Browser
 from .flaws import inaccessible
 from .made_up import data_in, whole_car
 from .test_viewer import labelled
@@ -326,35 +324,6 @@ def test_an_address_that_cannot_be_read_is_refused(server):
     assert answer.endswith("\r\n\r\nthe address cannot be read\n")
 
 
-def test_many_requests_at_once_are_answered_each(server):
-    with ThreadPoolExecutor(40) as pool:
-        answers = list(pool.map(lambda _: ask(server, "files/runs/both.html")[0], range(200)))
-    assert answers == [200] * 200
-
-
-def test_a_later_run_takes_the_place_of_one_that_is_not_done():
-    """The first run waits for its turn, the second stops it."""
-    bench = Bench()
-    bench._turn.acquire()
-    caught = []
-
-    def first() -> None:
-        try:
-            bench.run(Wanted("p", "", SCENARIO, (BRIEF,)))
-        except Superseded as error:
-            caught.append(error.code)
-
-    thread = threading.Thread(target=first)
-    thread.start()
-    while "p" not in bench._latest and thread.is_alive():
-        time.sleep(0.01)
-    bench._latest["p"] = StopFlag()
-    bench._turn.release()
-    thread.join()
-    bench.close()
-    assert caught == ["run-superseded"]
-
-
 def test_a_running_run_makes_way():
     bench = Bench()
     long = Wanted("p", "", SCENARIO, ("stop_time=2000",))
@@ -441,24 +410,6 @@ def test_samples_that_could_not_be_fetched_are_asked_for_again(server, chromium:
     chromium.run("document.querySelector('form.bench').bench.ask()")
     chromium.wait_for(f"{status}.startsWith('Run in')")
     assert chromium.run("return document.querySelectorAll('.yv').length") == 1
-
-
-def test_the_bench_fits_a_phone_and_can_be_read_there(server, chromium: Browser):
-    chromium.open(Path("/"), width=PHONE)
-    chromium.driver.get(f"{server.address}bench?scenario={SCENARIO}")
-    chromium.wait_for("document.querySelector('form.bench')?.dataset.shown")
-    assert chromium.overflow() <= 0
-    assert inaccessible(chromium, "dark") == []
-
-
-def test_a_run_is_chosen_by_the_box_on_the_line_of_its_name(server, chromium: Browser):
-    chromium.open(Path("/"))
-    chromium.driver.get(server.address)
-    box, name = chromium.run(
-        "return ['input', 'span'].map((tag) => document.querySelector(`table.runs label ${tag}`))"
-        "  .map((each) => each.getBoundingClientRect()).map(({top, bottom}) => (top + bottom) / 2)"
-    )
-    assert abs(box - name) < 5
 
 
 @pytest.mark.parametrize(

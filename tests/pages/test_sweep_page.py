@@ -16,7 +16,7 @@ from yawbench.bench.sliders import Bench
 from yawbench.cli import main
 from yawbench.orchestrator.results.reader import load_results
 
-from .browser import DESK, HELD, PHONE, Browser
+from .browser import DESK, PHONE, Browser
 from .flaws import SCREENS, check_first_screen, flaws_in_print, inaccessible, looks
 from .made_up import HALF_A_CAR
 
@@ -98,27 +98,6 @@ def test_no_label_touches_another(chromium, sweep, width):
     assert chromium.run(TEXTS, ".ys-lines") == []
 
 
-@pytest.mark.exhaustive  # a minute
-def test_the_page_of_two_thousand_runs_keeps_its_budgets(chromium, tmp_path, fmus):
-    (tmp_path / "half.yaml").write_text(HALF_A_CAR)
-    large = SWEEP.replace("count: 4", "count: 100").replace("count: 5", "count: 10")
-    (tmp_path / "large.yaml").write_text(large)
-    with pytest.raises(SystemExit) as ended:
-        main(["sweep", str(tmp_path / "large.yaml"), "--out", str(tmp_path / "out"), "--fmus", str(fmus)])
-    assert not ended.value.code
-    page = tmp_path / "out" / "report.html"
-    assert page.stat().st_size < 5_000_000
-    for width in (PHONE, DESK):
-        opened(chromium, page, width=width)
-        assert chromium.run(VIEW + "return view.count") == 2000
-        assert chromium.run("return document.querySelectorAll('*').length") <= MOST_ELEMENTS
-        (caption,) = chromium.run(
-            "return [...document.querySelectorAll('.wide + .notes')].map((one) => one.textContent)"
-        )
-        assert caption.startswith("The first 40 of 200 rows")
-        assert chromium.console() == []
-
-
 def test_numbers_in_the_cells_and_every_count_are_those_of_the_table(chromium, sweep):
     opened(chromium, sweep.page)
     rates = {int(row["run"]): float(row["rate [rad/s]"]) for row in sweep.rows}
@@ -156,26 +135,6 @@ def test_a_moved_limit_and_a_brush_choose_the_runs_that_the_table_says(chromium,
     assert chromium.run("return document.activeElement.dataset.dim") == "speed"
     chromium.press("\ue017")  # Delete
     assert chromium.run(VIEW + "return view.visible.length") == 40
-
-
-def test_the_keys_go_from_line_to_line_of_the_chosen_runs_and_open_one(chromium, sweep):
-    opened(chromium, sweep.page)
-    rates = [float(row["rate [rad/s]"]) for row in sweep.rows]
-    axis = chromium.driver.find_element("css selector", ".ys-axis[data-dim='metric rate']")
-    chromium.run("arguments[0].focus()", axis)
-    chromium.press("\ue014")  # right: the lowest
-    assert rates[chromium.run(VIEW + "return view.row")] == min(rates)
-    seen = []
-    for _ in range(3):
-        chromium.press("\ue014")
-        seen.append(rates[chromium.run(VIEW + "return view.row")])
-    assert seen == sorted(rates)[1:4]
-    chromium.press("\ue012")  # left
-    row = chromium.run(VIEW + "return view.row")
-    assert rates[row] == seen[1]
-    assert f"Run {row + 1}," in chromium.run("return document.querySelector('.ys-told').textContent")
-    chromium.press("\ue007")  # Enter
-    assert chromium.run(VIEW + "return view.state.open.at(-1)") == row
 
 
 def test_a_click_on_a_cell_opens_its_run_with_the_recorded_samples(chromium, sweep):
@@ -254,19 +213,6 @@ def test_a_missing_side_file_is_said_on_the_page(chromium, sweep, tmp_path):
     chromium.wait_for("document.querySelector('.ys-remark p')")
     assert "is missing" in chromium.run("return document.querySelector('.ys-remark').textContent")
     chromium.console()  # the browser names the file, too
-
-
-def test_a_late_error_is_not_told_of_a_run_that_is_no_longer_open(chromium, sweep):
-    opened(chromium, sweep.page)
-    remarks = chromium.run(
-        HELD + VIEW + "const rows = view.data.sides.flatMap((kept, k) => (kept ? [k] : []));"
-        "view.state.open = [rows[0]]; view.show(); await frames();"
-        "view.state.open = [rows[1]]; view.show(); await frames();"
-        "end(held[1]); await until(() => document.querySelector('.ys-run .yv-ready'));"
-        "fail(held[0]); await frames();"
-        "return [held.length, document.querySelector('.ys-remark').textContent]"
-    )
-    assert remarks == [2, ""]
 
 
 def test_chosen_runs_as_csv_are_rows_of_the_table(chromium, sweep):

@@ -140,27 +140,6 @@ def test_decoded_samples_equal_those_of_the_car(chromium: Browser, made, page):
         assert abs(value - wanted) <= spans[name] / 131068 * (1 + 1e-9), name
 
 
-def test_the_band_is_filled_behind_the_points(chromium: Browser, made, page):
-    chromium.open(page)
-    chromium.wait_for("document.querySelector('.yv-ready')")
-    (plot,) = made[2].plots
-    times = [plot.time, *(test.time for test in plot.tests)]
-    ends = min(float(t[0]) for t in times), max(float(t[-1]) for t in times)
-    assert chromium.run(VIEWER + "return viewer.ends()") == pytest.approx(ends)  # the band adds no time
-    lines = VIEWER + "return viewer.panels[0].shown.map(({run}) => Boolean(run.band))"
-    assert chromium.run(lines) == [True] + 5 * [False]
-    values = chromium.run(VIEWER + "return viewer.panels[0].cells.map((one) => one.textContent)")
-    assert [value == "–" for value in values] == [True] + 5 * [False]  # an outline has two values, or none
-    filled = chromium.run(
-        VIEWER + "const {plot} = viewer.panels[0]; const {ctx} = plot;"
-        "const x = plot.valToPos(3, 'x', true); const y = plot.valToPos(3 * 18 / Math.PI + 4.5, 'y', true);"
-        "return [...ctx.getImageData(Math.round(x), Math.round(y), 1, 1).data];"
-    )
-    assert filled[:3] == [0xDC, 0xE9, 0xF5]
-    chromium.run(VIEWER + "viewer.state.x = 'time'; viewer.state.span = null; viewer.refresh();")
-    assert chromium.run(lines) == 5 * [False]  # a band has no times
-
-
 @pytest.mark.parametrize(("width", "colours"), looks(PHONE, DESK, narrow=True))
 def test_the_page_has_no_flaws_and_stays_within_its_budget(chromium: Browser, page, width, colours):
     check_whole(chromium, page, width, colours)

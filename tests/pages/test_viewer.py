@@ -10,14 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.checkout import ROOT
 from tests.orchestrator.recorded import car, noted, write
 from tests.refusals import each_mentions, mentions
 from yawbench.cli import main
 from yawbench.components.driving.track import LaneChangeParameters, Track
 from yawbench.figures.display import digits_of, shown_unit
 from yawbench.figures.panels import LabelledRun
-from yawbench.figures.style import LINES
 from yawbench.foundation.errors import ResultsError
 from yawbench.orchestrator.results.measurement_results import MeasuredResults
 from yawbench.orchestrator.results.reader import Results
@@ -31,7 +29,6 @@ from yawbench.reports.viewer import (
     page,
     still_of,
     viewer,
-    without_comments,
 )
 from yawbench.reports.viewer_data import pack
 from yawbench.vocabulary.lane_change import lanes_of
@@ -490,17 +487,6 @@ def test_a_wrong_address_shows_the_first_picture(chromium, two, fragment):
     assert chromium.console() == []
 
 
-def test_the_difference_of_a_run_from_itself_is_zero(chromium, tmp_path):
-    file = tmp_path / "same.html"
-    file.write_text(page(labelled(whole_car(), whole_car())), "utf-8")
-    opened(chromium, file, "run?difference=true")
-    values = chromium.run(
-        VIEWER + "return viewer.panels.map((panel) => panel.shown.map((line) => [...line.values]))"
-    )
-    assert [len(lines) for lines in values] == [1] * len(PANELS)
-    assert all(value == 0 for lines in values for line in lines for value in line)
-
-
 def test_a_difference_is_that_from_the_baseline_with_its_tolerance(chromium, two):
     opened(chromium, two, "run?difference=true&tolerance=10")
     runs = (whole_car(), whole_car(2.0))
@@ -511,11 +497,6 @@ def test_a_difference_is_that_from_the_baseline_with_its_tolerance(chromium, two
     first = runs[0].time[np.argmax(np.abs(apart) > 0.1 * np.max(np.abs(runs[0][name])))]
     said = chromium.run("return document.querySelector('.yv-panel output').textContent")
     assert said == f"beyond 10 % from {digits_of(first, 4)} s (off)"
-
-
-def test_a_time_offset_shifts_a_run(chromium, two):
-    opened(chromium, two, 'run?offsets={"1":0.5}')
-    assert chromium.run(VIEWER + "return [viewer.runs[1].shifted[0], viewer.ends()]") == [0.5, [0, 8.5]]
 
 
 def test_a_measured_run_has_a_field_for_its_offset(chromium, tmp_path):
@@ -585,14 +566,6 @@ def test_the_csv_holds_the_span_in_si(chromium, two):
     np.testing.assert_allclose([float(row[2]) for row in mine], recorded["plant.sideslip"][inside], atol=2e-5)
 
 
-def test_the_png_holds_every_panel(chromium, two):
-    opened(chromium, two, density=2)
-    wide, high, bytes_ = chromium.run(
-        VIEWER + "const p = viewer.picture(); return [p.width, p.height, p.toDataURL().length]"
-    )
-    assert wide > 900 and high > len(PANELS) * 180 and bytes_ > 20_000
-
-
 def test_forces_are_turned_into_vehicle_axes_at_the_front_alone(chromium, two):
     seen(chromium, two)
     recorded = whole_car()
@@ -621,26 +594,6 @@ def test_friction_circles_of_an_axle_touch_at_most(chromium, two):
     assert 0.9 * SIZES["track_width"] < widest < SIZES["track_width"]
 
 
-def test_controls_have_names(chromium, two):
-    seen(chromium, two)
-    controls = chromium.driver.find_elements("css selector", "button, select, input")
-    names = [element.accessible_name for element in controls if element.is_displayed()]
-    assert len(names) > 15
-    assert all(names), names
-
-
-def test_a_panel_has_a_table_and_a_sentence_for_screen_readers(chromium, two):
-    seen(chromium, two)
-    table = chromium.run(VIEWER + "return viewer.panels[2].table.innerText")
-    sentence = chromium.run(VIEWER + "return viewer.panels[2].sentence.textContent")
-    recorded = whole_car()["plant.acceleration_y"]
-    low, high = (digits_of(value, 4) for value in (recorded.min(), recorded.max()))
-    assert mentions(sentence, "-4.500", "-5.400", "5.400 m/s²", "neural", "network")
-    assert float(re.findall(r"-?[\d.]+", sentence)[0]) == pytest.approx(float(low), rel=1e-3)
-    assert float(re.findall(r"-?[\d.]+", sentence)[1]) == pytest.approx(float(high), rel=1e-3)
-    assert mentions(table, "at the cursor")
-
-
 def test_it_plays_to_its_end_and_stops(chromium, two):
     opened(chromium, two)
     chromium.run(VIEWER + "viewer.seek(7.9); viewer.road.rate = 2; viewer.road.play();")
@@ -664,12 +617,6 @@ def test_every_camera_keeps_what_it_follows_in_sight(chromium, two):
                 assert all(0 < at < limit for at, limit in zip(places[run], size, strict=True)), (view, time)
 
 
-def test_runs_differ_in_grey_print(two):
-    dashes = data_in(two.read_text(encoding="utf-8"))["dashes"]
-    assert len(dashes) == len(LINES)
-    assert dashes[0] != dashes[1]
-
-
 def test_several_viewers_share_a_page(chromium, tmp_path):
     parts = [viewer(labelled(whole_car()), name="a"), viewer(labelled(whole_car(), whole_car(2.0)), name="b")]
     file = tmp_path / "report.html"
@@ -685,16 +632,6 @@ def test_several_viewers_share_a_page(chromium, tmp_path):
     chromium.wait_for("document.querySelectorAll('.yv-ready').length === 2")
     assert chromium.run(f"return {viewers}.map((one) => one.state.span)") == [None, [2, 3]]
     assert chromium.run(f"return {viewers}[0].state.time") == 1
-
-
-@pytest.mark.parametrize("number", [*(pytest.param(few, marks=pytest.mark.exhaustive) for few in (1, 7)), 9])
-def test_one_run_seven_and_more(chromium, tmp_path, number):
-    file = tmp_path / "many.html"
-    file.write_text(page(labelled(*(whole_car(1.0 + 0.1 * k) for k in range(number)))), "utf-8")
-    opened(chromium, file)
-    assert chromium.console() == []
-    assert chromium.run("return document.querySelectorAll('.yv-runs tbody tr').length") == number
-    assert chromium.run(VIEWER + "return viewer.panels[2].shown.length") == number
 
 
 def test_two_hundred_runs_are_listed_few_at_first(chromium, tmp_path):
@@ -820,41 +757,6 @@ def test_print_is_finer_and_shows_no_controls(chromium, two):
     }
     assert shown["bar"] == shown["time"] == "none"
     assert "none" not in (shown["scene"], shown["panels"], shown["runs"])
-
-
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_lines_stand_out_from_the_ground_in_light_and_dark(chromium, two, scheme):
-    chromium.driver.execute_cdp_cmd(
-        "Emulation.setEmulatedMedia", {"features": [{"name": "prefers-color-scheme", "value": scheme}]}
-    )
-    chromium.driver.get(two.resolve().as_uri())
-    chromium.wait_for("document.querySelector('.yv-ready')")
-    theme = chromium.run(VIEWER + "return viewer.theme")
-    for colour in (*theme["runs"], theme["ink"], theme["quiet"]):
-        wanted = 4.5 if colour in (theme["ink"], theme["quiet"]) else 2.1  # Okabe and Ito's sky blue on white
-        assert contrast(colour, theme["ground"]) >= wanted, (scheme, colour)
-
-
-def contrast(one: str, other: str) -> float:
-    """Return the contrast ratio of two colours `#rgb` or `#rrggbb` (WCAG 2.2)."""
-
-    def luminance(colour: str) -> float:
-        digits = colour.lstrip("#")
-        pairs = [2 * d for d in digits] if len(digits) == 3 else [digits[k : k + 2] for k in (0, 2, 4)]
-        parts = [int(pair, 16) / 255 for pair in pairs]
-        linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in parts]
-        return float(np.dot(linear, [0.2126, 0.7152, 0.0722]))
-
-    low, high = sorted([luminance(one), luminance(other)])
-    return (high + 0.05) / (low + 0.05)
-
-
-def test_scripts_lose_comments_and_indentation_alone():
-    script = "  // why\n\n  let a = 'b // c';  // d\n/* e */\n"
-    assert without_comments(script) == "let a = 'b // c';\n/* e */\n"
-    for file in (ROOT / "yawbench").glob("*/static/*.js"):
-        for line in file.read_text(encoding="utf-8").splitlines():
-            assert line.count("`") % 2 == 0  # no text goes over several lines
 
 
 def test_a_viewer_that_was_removed_writes_nothing_into_the_address(chromium: Browser, two):

@@ -96,18 +96,6 @@ def test_files_of_a_difference_say_so(shown, chromium, three):
     assert "reference.yaw_rate_ref [rad/s]" not in rows[0]
 
 
-def test_a_long_legend_stays_on_the_picture(chromium, tmp_path):
-    labels = [f"a law with a name that needs some room, number {k}" for k in range(7)]
-    runs = [LabelledRun(label, whole_car(1.0 + 0.1 * k)) for k, label in enumerate(labels)]
-    (tmp_path / "many.html").write_text(page(runs), "utf-8")
-    opened(chromium, tmp_path / "many.html", "run?difference=true")
-    said, wide = chromium.run(WORDS)
-    places = {text: (x, y) for text, x, y in said}
-    found = [places[f"{label} minus {labels[0]}"] for label in labels[1:]]
-    assert len({y for _, y in found}) > 1
-    assert all(x < 0.8 * wide for x, _ in found)
-
-
 DASHED = (
     VIEWER + "const panel = viewer.panels.find((one) => one.spec.startsWith('plant.yaw_rate'));"
     "const c = panel.plot.ctx, old = c.moveTo; let count = 0; c.moveTo = (x, y) => { count += 1; };"
@@ -125,19 +113,6 @@ def test_hiding_a_run_takes_its_instants_and_limits_along(chromium, three):
     assert count == 0 and high < np.degrees(9.0)
     chromium.run("document.querySelectorAll('.yv-show')[1].click()")
     assert chromium.run(DASHED)[0] == 2
-
-
-def test_with_all_runs_hidden_nothing_is_left(chromium, tmp_path):
-    run = LabelledRun(A, whole_car())
-    settings = Settings(
-        marks=[(1.0, "beginning")], limits=[("yaw_rate", 0.1, "much"), ("sideslip", 0.1, "much")]
-    )
-    (tmp_path / "one.html").write_text(page([run], settings), "utf-8")
-    opened(chromium, tmp_path / "one.html")
-    assert chromium.run(DASHED)[0] == 2
-    chromium.run("document.querySelector('.yv-show').click()")
-    assert chromium.run(DASHED)[0] == 0
-    assert chromium.run(VIEWER + "return viewer.panels.flatMap((panel) => panel.shown).length") == 0
 
 
 AT = VIEWER + (
@@ -162,19 +137,6 @@ def test_values_at_the_cursor_have_no_digits_finer_than_the_samples(fragment, ch
         decimals = len(text.partition(".")[2].partition("e")[0])
         unit = 10.0 ** (int((text.partition("e")[2] or "0").replace("−", "-")) - decimals)
         assert unit >= 0.99 * step, text
-
-
-def test_large_values_keep_their_digits(chromium, three):
-    opened(chromium, three)
-    run = whole_car(2.0)
-    peak = float(run.time[np.argmax(np.abs(run["plant.sideslip"]))])
-    text = chromium.run(AT, peak)[-2].replace("−", "-")
-    assert abs(float(text)) == pytest.approx(np.degrees(np.abs(run["plant.sideslip"]).max()), rel=1e-3)
-    known = (
-        "return [[1234567, 30], [0.00012345, 1e-3], [-1e-5, 1e-3], [0, 1e-3], [12.3456, 1e-6], [5, 0]]"
-        ".map(([value, grain]) => viewer.panels[0].text(value, grain))"
-    )
-    assert chromium.run(VIEWER + known) == ["1234600", "0.000", "0.000", "0", "12.35", "5.000"]
 
 
 @pytest.mark.parametrize(

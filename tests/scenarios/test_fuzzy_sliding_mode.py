@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import csv
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from tests.changed import changed
-from tests.refusals import sentence_has
-from tests.studies import check_figures, judge_all, judge_some, verdicts
-from yawbench.cli import main
+from tests.studies import judge_all, judge_some, verdicts
 from yawbench.components.control_laws.slip_control import SlipControlParameters
 from yawbench.figures.display import shown
 from yawbench.orchestrator.results.reader import load_results
@@ -213,18 +210,6 @@ def test_the_distribution_table_is_the_papers_in_order_and_best_in_proportion_to
     ]
     assert set(found["figures"]) == {"one_side_braked", "opposite_halves", "direct_torque"}
     assert sorted(mean, key=mean.get)[1] == "0.75_0.75"
-    told = section_of_the_page()
-    number = {key: one["value"] for key, one in found["derived"].items()}
-    assert sentence_has(told, f"{100 * (number['second'] - 1):.1f} %", "best")
-    whole, opposite = number["order_one_side"], number["order_opposite"]
-    assert sentence_has(told, f"{whole:.3f}", f"{opposite:.3f}", "rank", "correlation")
-    assert sentence_has(told, f"{number['order_without_zeros']:.3f}", "0", "shares")
-    assert sentence_has(told, f"{number['order_half_and_more']:.3f}", "half")
-
-
-def section_of_the_page():
-    page = (FOLDER.parents[1] / "docs" / "papers.md").read_text(encoding="utf-8")
-    return " ".join(page.partition("## Paper B")[2].partition("\n## ")[0].split())
 
 
 def test_the_page_on_papers_shows_what_the_study_found(study, metric):
@@ -236,45 +221,3 @@ def test_the_page_on_papers_shows_what_the_study_found(study, metric):
         for law in LAWS:
             mean, chatter = metric(f"{road}/{law}", "mean"), metric(f"{road}/{law}", "torque_chatter")
             assert f"{shown(mean, 'rad/s')}, {shown(chatter, 'N.m/s')}" in told
-    told = section_of_the_page()
-    rms = [100 * metric(f"{road}/{law}", "rms") for road in ROADS[:2] for law in ("sign", "fuzzy")]
-    assert sentence_has(told, f"{min(rms):.1f}", f"{max(rms):.1f} %", "error")
-    shares = [100 * study["derived"][f"{road}_torque"]["value"] for road in ("high", "low", "beyond")]
-    assert sentence_has(told, f"{min(shares):.0f}", f"{max(shares):.0f} %", "drop")
-    assert sentence_has(told, f"{3.6 * metric('low_friction/sign', 'final_speed'):.0f} km/h", "50")
-    slides, free = (np.degrees(metric(f"low_friction/{law}", "sideslip")) for law in ("sign", "off"))
-    assert sentence_has(told, f"{slides:.2f} degrees", f"{free:.2f}", "slides", "degrees")
-    assert sentence_has(told, f"{100 * metric('low_friction/off', 'relative_peak'):.1f} %", "reference")
-    slip, asked = (f"{metric('low_friction/fuzzy', name):.3g}" for name in ("slip", "slip_target"))
-    assert sentence_has(told, slip, asked, "comes")
-
-
-@pytest.mark.exhaustive
-def test_the_page_on_papers_tells_where_a_moment_by_all_wheels_ends(metric_of_all):
-    speed = 3.6 * metric_of_all("all_wheels/low_friction/sliding_mode", "final_speed")
-    assert sentence_has(section_of_the_page(), f"{speed:.0f} km/h", "ends")
-
-
-@pytest.mark.exhaustive
-def test_figures_and_tables_are_written(whole):
-    check_figures(
-        whole, "high_friction", "low_friction", "beyond_paper", "sliding", "braking_in_a_turn",
-        "driving_in_a_turn", "braking_straight",
-    )  # fmt: skip
-
-
-@pytest.mark.exhaustive
-def test_compare_shows_the_four_controllers(fmus, tmp_path):
-    with pytest.raises(SystemExit) as exit_:
-        main([
-            "compare", str(FOLDER / "low_friction.yaml"), "--fmus", str(fmus), "--out", str(tmp_path),
-            "--swap",
-            "controller=controller_off,controller_sliding_mode,controller_sliding_mode:switching=saturation,"
-            "controller_fuzzy_sliding_mode",
-        ])  # fmt: skip
-    assert not exit_.value.code
-    rows = csv.DictReader((tmp_path / "table.csv").open())
-    assert [row["run"] for row in rows] == [
-        "controller_off", "controller_sliding_mode", "controller_sliding_mode_switching=saturation",
-        "controller_fuzzy_sliding_mode",
-    ]  # fmt: skip

@@ -1,4 +1,4 @@
-"""Values altered in files of users and in records, a sample; `python -m tests.trials.altered` tries more."""
+"""Values altered in files of users and in records, a sample; `python -m campaigns.altered` tries more."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from .altered import GROUPS, Folder, base, trial
-from .full_disk import trial as on_a_full_disk
-from .kills import COMMANDS, UNITS, build_all
+from campaigns.altered import GROUPS, Folder, base, trial
+from campaigns.full_disk import trial as on_a_full_disk
+from campaigns.kills import COMMANDS, UNITS, build_all
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="forks, and limits the child")
 
@@ -20,14 +20,12 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Folder]:
     yield base(tmp_path_factory.mktemp("altered") / "base")
 
 
-@pytest.mark.parametrize("numbers", [range(3), pytest.param(range(1000, 1030), marks=pytest.mark.exhaustive)])
 @pytest.mark.parametrize("group", GROUPS)
-def test_altered_values_are_computed_with_or_answered_in_a_sentence(
-    group: str, numbers: range, folder: Folder
-) -> None:
-    counts, notes = trial(group, [*numbers], 1, folder, 1)
+@pytest.mark.sampled(2)
+def test_altered_values_are_computed_with_or_answered_in_a_sentence(group: str, folder: Folder) -> None:
+    counts, notes = trial(group, [0, 1, 2], 1, folder, 1)
     assert notes == []
-    assert sum(counts.values()) == len(numbers)
+    assert sum(counts.values()) == 3
 
 
 @pytest.mark.parametrize("command", COMMANDS)

@@ -1,4 +1,4 @@
-"""Commands killed at random moments, a sample; `python -m tests.trials.kills` kills more."""
+"""Commands killed at random moments, a sample; `python -m campaigns.kills` kills more."""
 
 from __future__ import annotations
 
@@ -7,10 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from campaigns.kills import COMMANDS, trial
 from tests.orchestrator.test_batch_commands import UNITS
 from yawbench.fmus.build import build_all
-
-from .kills import COMMANDS, trial
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs signals")

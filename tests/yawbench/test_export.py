@@ -10,7 +10,6 @@ import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib import import_module
-from pathlib import Path
 from typing import Any, Literal
 
 import fmpy
@@ -207,36 +206,6 @@ def test_modules_of_the_own_package_are_packed_with_it(ourlab, base, tmp_path):
             check=False,
         )
         assert done.stdout.split()[-1:] == ["-450.0"], done.stderr
-
-
-@pytest.mark.exhaustive
-def test_an_exported_law_is_tuned_by_a_file(tmp_path, base):
-    fmu = yb.export_fmu(law, tmp_path / "mine.fmu")
-    (tmp_path / "tuning.yaml").write_text(
-        f"""
-title: Mine
-metrics: {{error: {{metric: rms_error(yaw_rate)}}}}
-derived: {{cost: {{says: Error, expression: e, unit: rad/s, of: {{e: {{run: mine, metric: error}}}}}}}}
-runs: [{{name: mine, scenario: {base.path}, set: {{stop_time: 1.4}}}}]
-tuning:
-  objective: cost
-  population: 5
-  generations: 1
-  seed: 1
-  laws:
-    mine: {{swap: {{controller: {fmu}}}, axes: {{gain: {{vary: controller.gain, from: 1000, to: 40000}}}}}}
-"""
-    )
-    done = subprocess.run(
-        [sys.executable, "-m", "yawbench", "tune", "tuning.yaml", "--out", "tuned"],
-        cwd=tmp_path,
-        env=os.environ | {"PYTHONPATH": str(Path(yb.__file__).parents[1])},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    assert yb.open(tmp_path / "tuned").tables["trials"]["objective"].nunique() == 5
 
 
 def reads_a_file(yaw_rate):

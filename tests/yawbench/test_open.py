@@ -169,17 +169,3 @@ def test_a_measurement_file_is_opened_as_a_recording(tmp_path):
     run = yb.open(file)
     assert isinstance(run, yb.Run)
     assert np.array_equal(run["yaw_rate"], yb.measured(file)["yaw_rate"])
-
-
-@pytest.mark.exhaustive
-def test_a_folder_of_a_tuning_has_its_trials(tmp_path):
-    tuned = yawbench(tmp_path, "tune", "tune.yaml")
-    assert len(tuned.table) == 5
-    assert tuned.table["objective"].min() == tuned.tables["table"]["error"].min()
-
-
-@pytest.mark.exhaustive
-def test_a_folder_of_a_ranking_has_entries_and_cells(tmp_path):
-    made = yawbench(tmp_path, "rank", "--quick", "--condition", "hard", "--only", "none")
-    assert "none" in made.table["entry"].tolist()
-    assert set(made.tables) >= {"table", "cells"}

@@ -15,21 +15,6 @@ from yawbench import types
 from yawbench.orchestrator.fault_kinds import KINDS, FaultName
 from yawbench.proving_ground.standard_tests import TESTS, TestName
 
-ANYTHING = {
-    "Controller.output.u": "a named tuple with the fields that the controller's inputs name",
-    "Run.record.return": "JSON of any depth, whose definition is the schema of run.json",
-    "parameter.return": "a field of a dataclass of any type, as dataclasses.field returns it",
-    "Evaluation.as_data.return": "JSON, as it is written to evaluation.json",
-    "Fit.data.return": "JSON, as it is written to fit.json",
-    "Validation.as_data.return": "JSON, as it is written to validation.json",
-    "Verdict.as_data.return": "the same JSON",
-    "Plan.scenario": "the scenario file as it was run: JSON of any depth",
-    "Plan.__init__.scenario": "the same JSON",
-    "Diagnostic.record.return": "JSON, as it is written to run.json",
-    "Diagnostic.of.record": "the same JSON",
-}
-"""Parameters and return values annotated with Any, and why."""
-
 
 def functions(module: ModuleType) -> Iterator[tuple[str, Callable[..., object]]]:
     """Yield the public functions, methods and properties of a module, by name."""
@@ -66,11 +51,6 @@ def has(word: str, annotation: str) -> bool:
     return re.search(rf"\b{word}\b", annotation) is not None
 
 
-def test_no_public_signature_has_any_but_for_values_that_may_be_anything():
-    found = {name for name, annotation in annotations().items() if has("Any", annotation)}
-    assert found == set(ANYTHING)
-
-
 def test_literals_name_all_kinds_of_faults_and_all_standard_tests():
     assert get_args(FaultName) == (*KINDS,)
     assert get_args(TestName) == (*TESTS,)
@@ -104,12 +84,3 @@ def test_public_signatures_name_only_what_is_exported(module):
     notes = {key: note for key, note in annotations(module).items() if not key.startswith(IN_FILES)}
     named = {word for note in notes.values() for word in re.findall(r"\b[A-Z]\w+", note)}
     assert named - FOREIGN - {*yb.__all__} - {*types.__all__} == set()
-
-
-def test_every_exported_type_occurs_in_a_public_signature():
-    notes = " ".join([*annotations(yb).values(), *annotations(types).values()])
-    assert {name for name in types.__all__ if not re.search(rf"\b{name}\b", notes)} <= ALIASED
-
-
-ALIASED: set[str] = set()
-"""Types that occur in other aliases alone."""

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from ...trials.random_programs import OBJECT
-from ...trials.translated import REFUSED, SAME, Tried, tried_all
+from campaigns.random_programs import OBJECT
+from campaigns.translated import REFUSED, SAME, Tried, tried_all
 
 HEAD = """import copy
 import enum

@@ -1,4 +1,4 @@
-"""Commands on a disk that is full, and called again: `python -m tests.trials.full_disk --each 20`.
+"""Commands on a disk that is full, and called again: `python -m campaigns.full_disk --each 20`.
 
 No file that a command writes may exceed a size drawn between nothing and its largest file, as on a disk that
 fills up. The command must fail with a sentence or have done all of its work; what it leaves may not pass for

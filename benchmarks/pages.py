@@ -1,4 +1,4 @@
-"""Times and sizes of pages in a browser: `make bench`, or `python -m tests.bench_pages`.
+"""Times and sizes of pages in a browser: `make bench`, or `python -m benchmarks.pages`.
 
 Prints, and asserts nothing: times depend on the machine and on who else uses it. Every time is the best of
 several, followed by the median. The page is that of a comparison of four runs of paper A; a bench page of
@@ -18,13 +18,12 @@ from time import perf_counter
 
 import pytest
 
+from tests.commands import status_of
+from tests.pages.browser import Browser, start
+from tests.pages.flaws import size_without_samples
 from yawbench.bench.server import ResultsServer
 from yawbench.bench.sliders import Bench
 from yawbench.reports.page_parts import PAGE
-
-from .commands import status_of
-from .pages.browser import Browser, start
-from .pages.flaws import size_without_samples
 
 SCENARIO = "fnn_sideslip/25mps"
 CONTROLLERS = "controller_off,controller_fnn,controller_fuzzy_sideslip,controller_fuzzy_pid"

@@ -1,4 +1,4 @@
-"""Cost of short runs on a Dask cluster of this machine: `python -m tests.cluster_cost [--runs 5000]`.
+"""Cost of short runs on a Dask cluster of this machine: `python -m benchmarks.cluster [--runs 5000]`.
 
 Starts a scheduler and two workers, runs a sweep there by the command line, and prints the memory of the
 command and the scheduler and the scheduler's share of the time as the number of finished runs grows; the
@@ -23,7 +23,7 @@ from time import perf_counter, sleep
 import distributed
 import psutil
 
-from .bench import DEFAULT
+from .runs import DEFAULT
 
 WORKERS = 2
 PARTS = 8

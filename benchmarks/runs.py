@@ -1,10 +1,10 @@
-"""Cost of a run: `make bench`, or `python -m tests.bench [--long] [SCENARIO ...]`.
+"""Cost of a run: `make bench`, or `python -m benchmarks.runs [--long] [SCENARIO ...]`.
 
 Prints, and asserts nothing: times depend on the machine and on who else uses it. Every figure is the best of
 several runs, which is the one least disturbed, if nothing else is said. First comes a table of ratios, each
 of two things measured in turn, beside what they are to be at most; `--long` adds what takes minutes. Then,
 for every scenario, what the instances cost in the loop in Python, and what other masters take.
-`tests.bench_pages` measures pages.
+`benchmarks.pages` measures pages.
 """
 
 from __future__ import annotations
@@ -235,7 +235,7 @@ def ratio(one: Callable[[], float], other: Callable[[], float]) -> float:
 
 def stepping(path: Path, **environment: str) -> float:
     """Return the time of a communication step [s], in a process with this environment."""
-    command = [sys.executable, "-m", "tests.bench", "--step", str(path)]
+    command = [sys.executable, "-m", "benchmarks.runs", "--step", str(path)]
     done = subprocess.run(command, capture_output=True, check=True, env=os.environ | environment)
     return float(done.stdout)
 

@@ -1,6 +1,6 @@
-"""Files made wrong at random, through the loaders and the command line: `python -m tests.trials.mutations`.
+"""Files made wrong at random, through the loaders and the command line: `python -m campaigns.mutations`.
 
-    python -m tests.trials.mutations --files 10000 --commands 300 --ssp 3000 --results 600 --seed 1
+    python -m campaigns.mutations --files 10000 --commands 300 --ssp 3000 --results 600 --seed 1
 
 What must hold: a file is taken or answered by a sentence (exit status 0, 1 or 2), never by a traceback,
 within a time limit, and nothing is written outside the folder of results. Prints each case that did not,
@@ -33,7 +33,7 @@ from typing import Any
 
 from . import mutate
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[1]
 LIMIT = 10.0
 """Processor time that a file may take [s]."""
 STARVED = 12

@@ -1,4 +1,4 @@
-"""Commands killed at random moments and called again: `python -m tests.trials.kills --each 20`.
+"""Commands killed at random moments and called again: `python -m campaigns.kills --each 20`.
 
 A command is stopped by SIGKILL or SIGTERM at a moment drawn from the time that it takes undisturbed. What
 it leaves is then looked at (no half result may pass for a whole one), the command is called again, and

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..fmus.bare import LOGGER, OK, TYPES, Callbacks, Fmu
+from tests.fmus.bare import LOGGER, OK, TYPES, Callbacks, Fmu
 
 LOCATIONS: dict[str, Callable[[Path], str]] = {
     "URI": lambda folder: folder.as_uri(),

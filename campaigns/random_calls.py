@@ -1,7 +1,7 @@
-"""Random calls of FMI 2.0 to a unit, native and in Python: `python -m tests.trials.random_calls`.
+"""Random calls of FMI 2.0 to a unit, native and in Python: `python -m campaigns.random_calls`.
 
-    python -m tests.trials.random_calls --sequences 10 --seed 1                # of every FMU in fmus/
-    python -m tests.trials.random_calls --sequences 100 --only controller_pid  # of one
+    python -m campaigns.random_calls --sequences 10 --seed 1                # of every FMU in fmus/
+    python -m campaigns.random_calls --sequences 100 --only controller_pid  # of one
 
 What must hold: both libraries answer each call with the same status, sentences in the log and values, to the
 last bit; any two NaN are the same. Neither dies, and no sequence takes more than `SECONDS`. A sequence ends
@@ -26,11 +26,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from tests.fmus.bare import Fmu
 from yawbench.fmus.archive import WANTED
 from yawbench.fmus.build import HERE as FMUS
 from yawbench.fmus.native.ir import ALONE
 
-from ..fmus.bare import Fmu
 from .call_sequences import Writer
 from .fmi_calls import Call, Host
 

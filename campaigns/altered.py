@@ -1,7 +1,7 @@
-"""Values altered in files of users and in records read back: `python -m tests.trials.altered`.
+"""Values altered in files of users and in records read back: `python -m campaigns.altered`.
 
-    python -m tests.trials.altered --each 400 --seed 1 --jobs 2
-    python -m tests.trials.altered --only fit:17
+    python -m campaigns.altered --each 400 --seed 1 --jobs 2
+    python -m campaigns.altered --only fit:17
 
 They are vehicle, fit and measurement files, and what runs, studies, sweeps and fits have written. Unlike
 `mutations`, which breaks texts, an alteration keeps a file well-formed and gives one or a few of its
@@ -47,7 +47,7 @@ from yawbench.cli import main as yawbench
 
 from .kills import SWEEP
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[1]
 FMUS = ("--fmus", str(ROOT / "fmus"))
 LIMIT = 60
 """Processor time that a command may take [s]; chosen: ten times what the longest takes."""

@@ -1,6 +1,6 @@
 """Random laws made of classes, translated to C and driven beside Python: the same bytes, or a refusal.
 
-python -m tests.trials.classes --programs 3000 --seed 1
+python -m campaigns.classes --programs 3000 --seed 1
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""Every function of the library called with wrong things: `python -m tests.trials.wrong_calls`.
+"""Every function of the library called with wrong things: `python -m campaigns.wrong_calls`.
 
-    python -m tests.trials.wrong_calls                       # all calls
-    python -m tests.trials.wrong_calls --only run.metric     # those of a function or parameter
+    python -m campaigns.wrong_calls                       # all calls
+    python -m campaigns.wrong_calls --only run.metric     # those of a function or parameter
 
 What must hold: a wrong argument is answered by TypeError, ValueError or a YawbenchError, raised by our own
 code, whose text names the argument or the value; it is never taken, and no call hangs, dies or leaves
@@ -35,7 +35,7 @@ from yawbench.foundation.messages import unprintable
 
 from .wrong_values import TEXTS, WRONG, plant_links
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[1]
 OURS = [
     ROOT / name for name in ("yawbench", "orchestrator", "foundation", "fmus", "components", "vocabulary")
 ]

@@ -8,8 +8,9 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
-from ..fmus.bare import Fmu
-from ..fmus.plausible import plausible
+from tests.fmus.bare import Fmu
+from tests.fmus.plausible import plausible
+
 from . import fmi_calls as fmi
 
 BEFORE, DURING, AFTER, ENDED = "before initialization", "during initialization", "after it", "ended"

@@ -1,6 +1,6 @@
 """Random programs, translated to C and driven beside Python: the same bytes, or a refusal with its line.
 
-python -m tests.trials.translated --programs 2000 --seed 1
+python -m campaigns.translated --programs 2000 --seed 1
 """
 
 from __future__ import annotations
@@ -25,6 +25,8 @@ from pathlib import Path
 from typing import Any
 
 import yawbench._native
+from tests.fmus.native.small import HEAD, component_of, source
+from tests.fmus.native.together import choose, library_of, parts_of
 from yawbench._controller import PythonComponent
 from yawbench._native import folders_of
 from yawbench.fmus.native.compare_with_python import Native, Twin
@@ -33,8 +35,6 @@ from yawbench.fmus.native.ir import ALONE
 from yawbench.fmus.native.specialise import Program, specialise
 from yawbench.fmus.native.values import Refused
 
-from ..fmus.native.small import HEAD, component_of, source
-from ..fmus.native.together import choose, library_of, parts_of
 from .grammar import BEFORE
 from .random_programs import CALLED, COMPONENT, FUNCTION, OBJECT, program
 

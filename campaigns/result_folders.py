@@ -1,7 +1,7 @@
-"""Folders of results from somebody else, read by all that reads: `python -m tests.trials.result_folders`.
+"""Folders of results from somebody else, read by all that reads: `python -m campaigns.result_folders`.
 
-    python -m tests.trials.result_folders            # all of them
-    python -m tests.trials.result_folders --every 20
+    python -m campaigns.result_folders            # all of them
+    python -m campaigns.result_folders --every 20
 
 Each folder is that of a good run with one thing altered: a value in run.json or in a part of it, a file
 that is a link, a pipe or cut off, another name, size or time. What must hold for each command: exit status 0,

@@ -1,0 +1,1 @@
+"""Benchmarks: they print times and sizes, and assert nothing."""

@@ -1,0 +1,1 @@
+"""Campaigns against the program, run on demand; the tests run samples of some."""
