@@ -10,7 +10,6 @@ import time
 CAMPAIGNS = {
     "mutations": "--files 3000 --commands 100 --ssp 600 --results 200",
     "altered": "--each 100",
-    "records": "--each 60 --runs 10",
     "result_folders": "--every 4",
     "wrong_calls": "",
     "hostile_fmus": "",

@@ -102,10 +102,10 @@ class Contexts:
     def _now(self, test: str) -> None:
         import coverage
 
-        from yawbench.foundation import fork_server
+        from yawbench.foundation import processes
 
         os.environ["YAWBENCH_TEST"] = test
-        fork_server._end_server(fork_server.ForkServer.close)  # the next tells its children of this test
+        processes.end_server()  # the next tells its children of this test
         measured = coverage.Coverage.current()
         if measured is not None:
             measured.switch_context(test)
