@@ -223,7 +223,7 @@ def _dictcomp(e: Evaluator, node: ast.DictComp) -> Any:
 def _binop(e: Evaluator, node: ast.BinOp) -> Any:
     a, b = e.evaluate(node.left), e.evaluate(node.right)
     e.stack.at(node)
-    return e.operators.operate(BINARY.get(type(node.op), "@"), a, b)
+    return e.operators.operate(BINARY[type(node.op)], a, b)
 
 
 def _unaryop(e: Evaluator, node: ast.UnaryOp) -> Any:

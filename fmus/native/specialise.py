@@ -43,8 +43,6 @@ MOST_IN_ARRAYS = 32_768
 """Largest number of numbers in the arrays of a function; chosen: they take 256 KiB of its stack."""
 STACK = 512 * 1024 * 1024
 """Stack of the translating thread [bytes], since nested calls are evaluated by nested calls."""
-
-
 BASE = "fmi/"
 """Folder of the base class of components, whose lines say nothing about a component."""
 HOOKS = ("configure", "start", "advance", "output")
