@@ -9,19 +9,17 @@ import math
 import operator
 import types
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from . import ir
 from . import values as v
 from .attributes import member
+from .evaluate import Evaluator
 from .expressions import formatted
 from .loops import UNROLLED, for_each_index
 from .lower import COMPENSATED, complaint
 from .shapes import push
 from .values import EITHER, UNSET, Refused, is_mixed, is_number, is_plain, is_real, joined_text, read, same
-
-if TYPE_CHECKING:
-    from .evaluate import Evaluator
 
 MOST_IN_ARRAY = 4096
 """Largest number of numbers in an array; chosen: it is on the stack."""

@@ -13,18 +13,16 @@ import operator
 import sys
 import types
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from . import ir
 from . import values as v
 from .attributes import is_generated, member
 from .built_in import built_in, method_of, text_of
+from .evaluate import Evaluator
 from .read import names_set_by
 from .stack import Call
 from .values import UNSET, Refused, is_plain, like
-
-if TYPE_CHECKING:
-    from .evaluate import Evaluator
 
 
 def call(e: Evaluator, function: Any, args: list[Any], named: dict[str, Any]) -> Any:
