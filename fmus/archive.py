@@ -267,8 +267,6 @@ UNTRIED = "extra/org.yawbench.native/untried.txt"
 """Path in an archive of places in its native library that were never compared with Python, a line each."""
 WANTED = "YAWBENCH_UNITS"
 """Environment variable: `python` asks for Python in place of native code."""
-
-
 PYTHON_WANTED = RunsAs(f"{WANTED} asks for it")
 
 

@@ -14,6 +14,7 @@ import platform
 import shutil
 import sys
 import tempfile
+from base64 import b64decode, b64encode
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
@@ -191,11 +192,8 @@ def _let_through(
     key = hashlib.sha256(f"{text}{_comparison()}{limit}".encode()).hexdigest()[:32]
     kept = recall(STORE, key)
     if kept is not None:
-        length = int.from_bytes(kept[:8], "little")
-        record, rest = json.loads(kept[8 : 8 + length]), kept[8 + length :]
-        files = {}
-        for path, size in record["files"]:
-            files[path], rest = rest[:size], rest[size:]
+        record = json.loads(kept)
+        files = {path: b64decode(content) for path, content in record["files"].items()}
         return Native(files, record["why_not"], tuple(record["untried"]))
     try:
         most = min(limit, int(LONGEST)) if hurry else limit
@@ -204,13 +202,9 @@ def _let_through(
         if hurry:
             return Native(why_not=LATER, new=True)
         made = Native(why_not=str(error), new=True)
-    header = {
-        "files": [[path, len(data)] for path, data in made.files.items()],
-        "why_not": made.why_not,
-        "untried": made.untried,
-    }
-    head = json.dumps(header).encode()
-    keep(STORE, key, len(head).to_bytes(8, "little") + head + b"".join(made.files.values()))
+    contents = {path: b64encode(content).decode() for path, content in made.files.items()}
+    record = {"files": contents, "why_not": made.why_not, "untried": made.untried}
+    keep(STORE, key, json.dumps(record).encode())
     return made
 
 

@@ -9,19 +9,17 @@ import math
 import operator
 import types
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from . import ir
 from . import values as v
 from .attributes import member
+from .evaluate import Evaluator
 from .expressions import formatted
 from .loops import UNROLLED, for_each_index
 from .lower import COMPENSATED, complaint
 from .shapes import push
 from .values import EITHER, UNSET, Refused, is_mixed, is_number, is_plain, is_real, joined_text, read, same
-
-if TYPE_CHECKING:
-    from .evaluate import Evaluator
 
 MOST_IN_ARRAY = 4096
 """Largest number of numbers in an array; chosen: it is on the stack."""
@@ -108,21 +106,14 @@ class Repeated:
 
 def _float(e: Evaluator, value: Any) -> Any:
     if type(value) is str:
-        return _called(e, float, value)
+        return e.lower.computed(float, value)
     return _converted(e, "__float__", (ir.REAL,), e.lower.as_real, value)
 
 
 def _int(e: Evaluator, value: Any) -> Any:
     if type(value) is str:
-        return _called(e, int, value)
+        return e.lower.computed(int, value)
     return _converted(e, "__int__", (ir.INT,), lambda x: e.lower.whole("trunc", x), value)
-
-
-def _called(e: Evaluator, function: Any, text: str) -> Any:
-    try:
-        return function(text)
-    except ValueError as error:
-        e.lower.end("ValueError", str(error))
 
 
 def _converted(e: Evaluator, name: str, of: Sequence[str], usual: Any, value: Any) -> Any:
@@ -290,10 +281,7 @@ def _in_order(e: Evaluator, op: str, a: Any, b: Any) -> ir.Operand:
 def _searched(e: Evaluator, method: Callable[..., int], owner: v.List, args: Sequence[Any]) -> int:
     if not all(map(is_plain, (*read(owner), *args))):
         raise Refused(f"the method {method.__name__} of a list")
-    try:
-        return method(read(owner), *args)
-    except ValueError as error:
-        e.lower.end("ValueError", str(error))
+    return e.lower.computed(method, read(owner), *args)  # type: ignore[no-any-return]
 
 
 def _view(owner: v.Dict, keys: tuple[Any, ...], with_keys: bool) -> v.Each:

@@ -13,18 +13,16 @@ import operator
 import sys
 import types
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from . import ir
 from . import values as v
 from .attributes import is_generated, member
 from .built_in import built_in, method_of, text_of
+from .evaluate import Evaluator
 from .read import names_set_by
 from .stack import Call
 from .values import UNSET, Refused, is_plain, like
-
-if TYPE_CHECKING:
-    from .evaluate import Evaluator
 
 
 def call(e: Evaluator, function: Any, args: list[Any], named: dict[str, Any]) -> Any:
@@ -251,35 +249,26 @@ def _fill(
     named: dict[str, Any],
 ) -> None:
     """Do what the __init__ that a dataclass has generated does."""
-    known = {f.name: f for f in dataclasses.fields(cls)}
-    parameters = list(inspect.signature(init).parameters.values())[1:]
-    positional = [p.name for p in parameters if p.kind is not p.KEYWORD_ONLY]
-    if len(args) > len(positional) or named.keys() & set(positional[: len(args)]):
-        raise Refused(f"arguments of {cls.__name__} that do not fit")
-    given = dict(zip(positional, args, strict=False)) | named
-    if given.keys() - {p.name for p in parameters}:
-        raise Refused(f"arguments of {cls.__name__} that do not fit")
+    fields, signature = dataclasses.fields(cls), inspect.signature(init)
+    try:
+        given = signature.bind(made, *args, **named).arguments
+    except TypeError as error:
+        raise Refused(f"making a {cls.__name__}: {error}") from None
+    names = [p.name for p in list(signature.parameters.values())[1:]]
     frozen = is_generated(vars(cls).get("__setattr__"))
-    for p in parameters:
-        if p.name in known or p.name in given:
-            continue
-        if p.default is p.empty:
-            raise Refused(f"{cls.__name__} needs {p.name}")
-        given[p.name] = p.default
-    for f in known.values():
+    for f in fields:
         if f.name in given:
             value = given[f.name]
         elif f.default_factory is not dataclasses.MISSING:
             value = e.call(f.default_factory, [], {})
-        elif not f.init:
-            continue
-        elif f.default is not dataclasses.MISSING:
+        elif f.init:
             value = f.default
         else:
-            raise Refused(f"{cls.__name__} needs {f.name}")
+            continue
         (e.attributes.set_as_object if frozen else e.attributes.set)(made, f.name, value)
     if member(cls, "__post_init__") is not UNSET:
-        rest = [given[p.name] for p in parameters if p.name not in known]
+        known = {f.name for f in fields}
+        rest = [given.get(x, signature.parameters[x].default) for x in names if x not in known]
         e.call(e.attributes.of(made, "__post_init__"), rest, {})
 
 

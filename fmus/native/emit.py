@@ -356,7 +356,7 @@ _OPERATIONS: dict[str, Callable[..., str]] = {
     "overflown": lambda f, s, result, *args: (
         f"isinf({f._real(result)}) && " + " && ".join(f"isfinite({f._real(x)})" for x in args)
     ),
-    "right_word": lambda f, s, x, count: f"{f._word(x)} >> {int(count)}",
+    "rshift_word": lambda f, s, x, count: f"{f._word(x)} >> {int(count)}",
     "ring_item": _Function._ring_item,
     "ring_length": lambda f, s, ring: f"(double)lists[{ring}].count",
     "select": lambda f, s, test, a, b: (

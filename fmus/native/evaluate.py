@@ -3,34 +3,33 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Container, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from typing import Any
 
 from . import ir
 from .attributes import Attributes
-from .calls import call
-from .expressions import EXPRESSIONS
 from .items import Containers
-from .loops import LOOPS
 from .lower import Lowering
 from .memory import Memory
 from .operators import Operators
 from .outline import Library, Outlining
 from .paths import Paths
-from .read import Sources
+from .read import Sources, Tree
 from .shapes import Promote
 from .stack import EXIT, ON, RESULT, RETURN, Call, Stack
-from .statements import STATEMENTS
 from .values import ANY, Refused, Unreachable
 
-UNDERSTOOD = EXPRESSIONS | STATEMENTS | LOOPS
-"""Kinds of nodes of the syntax tree that are understood, with what evaluates them."""
 DEEPEST = 60
 """Largest depth of nested calls; chosen: more than components need, to detect infinite recursion."""
 
 
 class Evaluator:
     """Evaluator of a function and of all that it calls; its parts hold each other.
+
+    Args:
+        understood: kinds of nodes of the syntax tree that are understood, with what evaluates them.
+        calling: evaluates a call of a function with arguments and named arguments.
+        library: functions that were outlined before.
 
     Attributes:
         sources: functions that are translated.
@@ -40,8 +39,15 @@ class Evaluator:
         memory, paths, attributes, items, operators, outlining: see their classes.
     """
 
-    def __init__(self, sources: Sources, fixed: Container[ir.Var], library: Library) -> None:
-        self.sources, self.fixed = sources, fixed
+    def __init__(
+        self,
+        understood: Mapping[type[ast.AST], Callable[..., Any]],
+        calling: Callable[..., Any],
+        sources: Sources,
+        fixed: Container[ir.Var],
+        library: Library,
+    ) -> None:
+        self._table, self._calling, self.sources, self.fixed = understood, calling, sources, fixed
         self.stack = Stack()
         self.lower = Lowering(self.stack)
         self.memory = Memory(self.lower)
@@ -49,7 +55,7 @@ class Evaluator:
         self.attributes = Attributes(self.paths, self.call)
         self.items = Containers(self.attributes)
         self.operators = Operators(self.items)
-        self.outlining = Outlining(self, library)
+        self.outlining = Outlining(self.paths, fixed, library, self.inside)
 
     def evaluate(self, node: ast.expr) -> Any:
         """Return the value of an expression.
@@ -67,10 +73,10 @@ class Evaluator:
         """
         kind = type(node).__name__
         self.stack.at(node)
-        if type(node) not in UNDERSTOOD:
+        if type(node) not in self._table:
             raise Refused(f"{kind} is not translated: {_first_line(node)}", self.stack.where())
         try:
-            return UNDERSTOOD[type(node)](self, node)
+            return self._table[type(node)](self, node)
         except Refused as refused:
             if not refused.where:
                 self.stack.at(node)
@@ -124,9 +130,9 @@ class Evaluator:
 
     def call(self, function: Any, args: Sequence[Any], named: dict[str, Any]) -> Any:
         """Return the value of a call."""
-        return call(self, function, list(args), named)
+        return self._calling(self, function, list(args), named)
 
-    def inside(self, call: Call, node: ast.FunctionDef | ast.Lambda) -> Any:
+    def inside(self, call: Call, node: Tree) -> Any:
         """Return the value of a function, evaluated in place."""
         if len(self.stack.calls) > DEEPEST:
             raise Refused("recursion whose depth is only known at run time")

@@ -8,18 +8,16 @@ import re
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from . import ir
 from . import values as v
+from .evaluate import Evaluator
 from .operators import BINARY
 from .read import kinds_within
 from .stack import Call
 from .statements import assign
 from .values import EITHER, UNSET, Refused, is_plain, joined_text, read
-
-if TYPE_CHECKING:
-    from .evaluate import Evaluator
 
 
 def _name(e: Evaluator, node: ast.Name) -> Any:
@@ -223,7 +221,7 @@ def _dictcomp(e: Evaluator, node: ast.DictComp) -> Any:
 def _binop(e: Evaluator, node: ast.BinOp) -> Any:
     a, b = e.evaluate(node.left), e.evaluate(node.right)
     e.stack.at(node)
-    return e.operators.operate(BINARY.get(type(node.op), "@"), a, b)
+    return e.operators.operate(BINARY[type(node.op)], a, b)
 
 
 def _unaryop(e: Evaluator, node: ast.UnaryOp) -> Any:

@@ -5,19 +5,16 @@ from __future__ import annotations
 import ast
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from . import ir
 from . import values as v
+from .evaluate import Evaluator
 from .read import kinds_within, names_within
 from .shapes import Memo, Shape, Widening, build, numbers_of, shape_of, types_of
 from .stack import CONTINUE, EXIT, ON, OVER, RESULT, RETURN
 from .statements import assign
 from .values import OF_LOOP, RESIZED, UNSET, Refused, boxes_in, items_of, now, read, same
-
-if TYPE_CHECKING:
-    from .evaluate import Evaluator
-
 
 UNROLLED = 16
 """Number of passes up to which a loop over a range is unrolled; chosen: four wheels, seven sets."""

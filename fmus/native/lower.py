@@ -23,10 +23,8 @@ OPERATORS: dict[str, Callable[[Any, Any], Any]] = {
     "+": operator.add, "-": operator.sub, "*": operator.mul, "/": operator.truediv, "**": operator.pow,
     "//": operator.floordiv, "%": operator.mod, "&": operator.and_, "|": operator.or_, "^": operator.xor,
     ">>": operator.rshift, "<<": operator.lshift, "<": operator.lt, "<=": operator.le, ">": operator.gt,
-    ">=": operator.ge, "==": operator.eq, "!=": operator.ne,
+    ">=": operator.ge, "==": operator.eq, "!=": operator.ne, "@": operator.matmul,
 }  # fmt: skip
-_NAMES = {"+": "add", "-": "sub", "*": "mul", "&": "and", "|": "or", "^": "xor", ">>": "right"}
-_COMPARED = {"<": "lt", "<=": "le", ">": "gt", ">=": "ge", "==": "eq", "!=": "ne"}
 OF_WIDE = ("copy", "word", "add_word", "mul_word")
 """Operations of which the lowest 64 bits follow from those of the operands."""
 CAN_OVERFLOW = ("exp", "expm1", "sinh", "cosh")
@@ -35,6 +33,11 @@ DOMAIN = ("sqrt", "sin", "cos", "tan", "asin", "acos", "log", "log1p", "log10", 
 FUNCTIONS = (*CAN_OVERFLOW, *ALWAYS_DEFINED, *DOMAIN)
 MOST_OPERATIONS = 200_000
 """Largest number of operations of an evaluated function; chosen: twice those of the sensors, the most."""
+
+
+def name_of(op: str) -> str:
+    """Return the name of an operator in operations and special methods: "add" for "+"."""
+    return OPERATORS[op].__name__.rstrip("_")
 
 
 def complaint(call: Callable[[], Any]) -> tuple[str, str]:
@@ -158,6 +161,17 @@ class Lowering:
         self.fail(kind, *message)
         raise Unreachable
 
+    def computed(self, function: Callable[..., Any], *args: Any) -> Any:
+        """Return the value of a function at build time, or emit the exception that it raises."""
+        try:
+            return function(*args)
+        except (ArithmeticError, ValueError) as error:
+            self.end(type(error).__name__, str(error))
+
+    def _reject(self, test: str, *operands: ir.Operand, error: tuple[str, str]) -> None:
+        """Emit an exception for the case that an operation is true."""
+        self.require(self.negation(self.let(ir.BOOL, test, *operands)), *error)
+
     def require(self, condition: ir.Operand, kind: str, message: str) -> None:
         """Emit an exception for the case that a condition is false.
 
@@ -257,7 +271,7 @@ class Lowering:
         kinds = {ir.type_of(a), ir.type_of(b)}
         if kinds & {ir.WORD, ir.WIDE} and kinds != {ir.WORD}:
             a, b = _in_double(a), _in_double(b)
-        comparison = self.let(ir.BOOL, _COMPARED[op], a, b)
+        comparison = self.let(ir.BOOL, name_of(op), a, b)
         if op == "==" and isinstance(a, ir.Var) and isinstance(b, int) and a.type == ir.INT:
             self.facts.meanings[comparison] = ("is", a, int(b))
         return comparison
@@ -267,10 +281,7 @@ class Lowering:
     def binary(self, op: str, a: ir.Operand, b: ir.Operand) -> ir.Operand:
         """Return a op b."""
         if not isinstance(a, ir.Var) and not isinstance(b, ir.Var):
-            try:
-                result = OPERATORS[op](a, b)
-            except (ArithmeticError, ValueError) as error:
-                self.end(type(error).__name__, str(error))
+            result = self.computed(OPERATORS[op], a, b)
             if isinstance(result, complex):
                 raise Refused("a complex number")
             return result  # type: ignore[no-any-return]
@@ -280,8 +291,8 @@ class Lowering:
             return self._of_words(op, a, b)
         if op in ("+", "-", "*"):
             if real:
-                return self.let(ir.REAL, _NAMES[op], a, b)
-            return self.let(ir.INT, "mul_int" if op == "*" else _NAMES[op], a, b)
+                return self.let(ir.REAL, name_of(op), a, b)
+            return self.let(ir.INT, "mul_int" if op == "*" else name_of(op), a, b)
         if op in ("/", "//", "%"):
             if b == 0 or isinstance(b, ir.Var):
                 unit = 1.0 if real else 1
@@ -297,29 +308,26 @@ class Lowering:
     def _of_words(self, op: str, a: ir.Operand, b: ir.Operand) -> ir.Var:
         wide = ir.WIDE in (ir.type_of(a), ir.type_of(b))
         if op in ("+", "*"):
-            return self.let(ir.WIDE, f"{_NAMES[op]}_word", a, b)
+            return self.let(ir.WIDE, f"{name_of(op)}_word", a, b)
         if op == "&" and MASK in (a, b):
             return self.let(ir.WORD, "word", b if a == MASK else a)
         if op in ("&", "|", "^") and not wide:
-            return self.let(ir.WORD, f"{_NAMES[op]}_word", a, b)
+            return self.let(ir.WORD, f"{name_of(op)}_word", a, b)
         if op == ">>" and not isinstance(b, ir.Var) and 0 <= b < 64 and not wide:
-            return self.let(ir.WORD, "right_word", a, b)
+            return self.let(ir.WORD, "rshift_word", a, b)
         raise Refused(f"{op} of integers of 64 bits")
 
     def _power(self, a: ir.Operand, b: ir.Operand, real: bool) -> ir.Var:
         if not real and not (isinstance(b, int) and 0 <= b <= 8):
             raise Refused("a power of integers whose exponent is not a small number")
         if isinstance(b, ir.Var) or b < 0:
-            bad = self.let(ir.BOOL, "zero_power", a, b)
-            self.require(self.negation(bad), *complaint(lambda: 0.0**-1.0))
+            self._reject("zero_power", a, b, error=complaint(lambda: 0.0**-1.0))
         if isinstance(b, ir.Var) or (math.isfinite(b) and b != int(b)):
-            bad = self.let(ir.BOOL, "complex_power", a, b)
-            self.require(self.negation(bad), "TypeError", ir.COMPLEX)
+            self._reject("complex_power", a, b, error=("TypeError", ir.COMPLEX))
         if not real:
             return self.let(ir.INT, "pow", a, b)
         power = self.let(ir.REAL, "pow", a, b)
-        bad = self.let(ir.BOOL, "overflown", power, a, b)
-        self.require(self.negation(bad), *complaint(lambda: 1e200**2.0))
+        self._reject("overflown", power, a, b, error=complaint(lambda: 1e200**2.0))
         return power
 
     def negative(self, a: ir.Operand) -> ir.Operand:
@@ -350,25 +358,17 @@ class Lowering:
         rounding = {"trunc": int, "rint": round, "floor": math.floor, "ceil": math.ceil}
         by = rounding[op]
         if not isinstance(a, ir.Var):
-            try:
-                return by(a)
-            except (ArithmeticError, ValueError) as error:
-                self.end(type(error).__name__, str(error))
+            return self.computed(by, a)  # type: ignore[no-any-return]
         if a.type != ir.REAL:
             return a if a.type == ir.INT else self.let(ir.INT, "real", a)
-        bad = self.let(ir.BOOL, "isnan", a)
-        self.require(self.negation(bad), *complaint(lambda: by(math.nan)))
-        bad = self.let(ir.BOOL, "isinf", a)
-        self.require(self.negation(bad), *complaint(lambda: by(math.inf)))
+        self._reject("isnan", a, error=complaint(lambda: by(math.nan)))
+        self._reject("isinf", a, error=complaint(lambda: by(math.inf)))
         return self.let(ir.INT, op, a)
 
     def function(self, name: str, *operands: ir.Operand) -> ir.Operand:
         """Return the value of a function of `math`."""
         if not any(isinstance(x, ir.Var) for x in operands):
-            try:
-                return getattr(math, name)(*operands)  # type: ignore[no-any-return]
-            except (ArithmeticError, ValueError) as error:
-                self.end(type(error).__name__, str(error))
+            return self.computed(getattr(math, name), *operands)  # type: ignore[no-any-return]
         if name in ("floor", "ceil", "trunc"):
             return self.whole(name, operands[0])
         if name in ("isfinite", "isnan", "isinf"):
@@ -380,21 +380,17 @@ class Lowering:
             return self.let(ir.REAL, "norm", *operands)
         if name == "pow":
             for kind in ("pole" if POLE_IS_ERROR else "zero", "complex"):
-                undefined = self.let(ir.BOOL, f"{kind}_power", *operands)
-                self.require(self.negation(undefined), *complaint(lambda: math.sqrt(-1.0)))
+                self._reject(f"{kind}_power", *operands, error=complaint(lambda: math.sqrt(-1.0)))
             power = self.let(ir.REAL, "pow", *operands)
-            too_large = self.let(ir.BOOL, "overflown", power, *operands)
-            self.require(self.negation(too_large), *complaint(lambda: math.exp(1e3)))
+            self._reject("overflown", power, *operands, error=complaint(lambda: math.exp(1e3)))
             return power
         if name not in FUNCTIONS:
             raise Refused(f"math.{name}")
         result = self.let(ir.REAL, name, *operands)
         if name in CAN_OVERFLOW:
-            bad = self.let(ir.BOOL, "overflown", result, operands[0])
-            self.require(self.negation(bad), *complaint(lambda: math.exp(1e3)))
+            self._reject("overflown", result, operands[0], error=complaint(lambda: math.exp(1e3)))
         elif name in DOMAIN:
-            bad = self.let(ir.BOOL, "undefined", result, *operands)
-            self.require(self.negation(bad), *complaint(lambda: math.sqrt(-1.0)))
+            self._reject("undefined", result, *operands, error=complaint(lambda: math.sqrt(-1.0)))
         return result
 
 

@@ -11,21 +11,15 @@ from . import ir
 from . import values as v
 from .attributes import member
 from .items import Containers
-from .lower import OPERATORS
+from .lower import OPERATORS, name_of
 from .values import EITHER, UNSET, Refused, is_mixed, is_number, is_plain, is_real, read
 
 BINARY = {
     ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.FloorDiv: "//", ast.Mod: "%", ast.Pow: "**",
-    ast.BitAnd: "&", ast.BitOr: "|", ast.BitXor: "^", ast.RShift: ">>", ast.LShift: "<<",
+    ast.BitAnd: "&", ast.BitOr: "|", ast.BitXor: "^", ast.RShift: ">>", ast.LShift: "<<", ast.MatMult: "@",
 }  # fmt: skip
 COMPARED = {
     ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!=",
-}  # fmt: skip
-
-
-METHODS = {
-    "+": "add", "-": "sub", "*": "mul", "/": "truediv", "//": "floordiv", "%": "mod", "**": "pow", "&": "and",
-    "|": "or", "^": "xor", ">>": "rshift", "<<": "lshift", "@": "matmul",
 }  # fmt: skip
 COMPARISONS = {
     "<": ("__lt__", "__gt__"), "<=": ("__le__", "__ge__"),
@@ -76,7 +70,7 @@ class Operators:
             )
         a, b = (self.memory.loaded(x) if isinstance(x, v.Picked) else x for x in (a, b))
         if not (is_number(a) and is_number(b)):
-            name = METHODS[op]
+            name = name_of(op)
             result = self._by_class(a, b, f"__i{name}__", "") if in_place else NotImplemented
             if result is NotImplemented:
                 result = self._by_class(a, b, f"__{name}__", f"__r{name}__")
@@ -94,7 +88,7 @@ class Operators:
             return a + b
         if isinstance(a, tuple) and isinstance(b, int) and op == "*":
             return a * b
-        if (is_plain(a) and is_plain(b) and a is not None and b is not None and op in OPERATORS) or (
+        if (is_plain(a) and is_plain(b) and a is not None and b is not None and op != "@") or (
             type(a) is frozenset and type(b) in (set, frozenset)
         ):
             return OPERATORS[op](a, b)

@@ -6,13 +6,14 @@ is long enough, the function is outlined; all other calls are evaluated in place
 
 from __future__ import annotations
 
-import ast
+from collections.abc import Callable, Container
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from . import ir
 from .lower import Facts
-from .read import kinds_within
+from .paths import Paths
+from .read import Tree, kinds_within
 from .shapes import (
     Forms,
     Growing,
@@ -32,10 +33,6 @@ from .shapes import (
 from .stack import Call
 from .values import Box, Frame, Picked, Refused, is_plain, read
 
-if TYPE_CHECKING:
-    from .evaluate import Evaluator
-
-
 SHORTEST = 40
 """Smallest number of statements of an outlined function; chosen: a call with its arguments takes a dozen."""
 SMALLEST = 25
@@ -53,60 +50,72 @@ class Library:
 
 
 class Outlining:
-    """Outlining of the calls of an evaluator."""
+    """Outlining of calls.
 
-    def __init__(self, evaluator: Evaluator, library: Library) -> None:
-        self.e, self.library = evaluator, library
+    Args:
+        paths: what follows the paths of a call.
+        fixed: variables that are the same in every call, such as parameters.
+        library: functions that were outlined before.
+        inside: evaluates a call in place.
+    """
 
-    def run(self, call: Call, node: ast.FunctionDef | ast.Lambda) -> Any:
-        if not self.e.stack.calls or kinds_within(node).total() < SMALLEST:
-            return self.e.inside(call, node)
+    def __init__(
+        self, paths: Paths, fixed: Container[ir.Var], library: Library, inside: Callable[[Call, Tree], Any]
+    ) -> None:
+        self.lower, self.paths, self.fixed, self.library, self.inside = (
+            paths.lower, paths, fixed, library, inside
+        )  # fmt: skip
+
+    def run(self, call: Call, node: Tree) -> Any:
+        """Return the value of a call, of a function that is outlined if it can be."""
+        if not self.lower.stack.calls or kinds_within(node).total() < SMALLEST:
+            return self.inside(call, node)
         for name, value in call.frame.slots.items():
             if isinstance(value, Picked):
-                call.frame.slots[name] = self.e.memory.loaded(value)
+                call.frame.slots[name] = self.paths.memory.loaded(value)
         chosen = {
-            tag: left for tag in self.e.paths.choosers if (left := self.e.lower.facts.left(tag)) is not None
+            tag: left for tag in self.paths.choosers if (left := self.lower.facts.left(tag)) is not None
         }
         try:
-            shape = shape_of(call.frame, read, "", Memo(self.e.fixed))
+            shape = shape_of(call.frame, read, "", Memo(self.fixed))
         except Refused:
-            return self.e.inside(call, node)  # an argument is not made of numbers
+            return self.inside(call, node)  # an argument is not made of numbers
         key = id(call.source), id(node), _key(shape, {}), frozenset(chosen.items())
         if key not in self.library.made:
             self.library.kept.append((call.source, shape))
             self.library.made[key] = self._tried(call, node, shape, chosen)
         outlined = self.library.made[key]
         if outlined is None:
-            return self.e.inside(call, node)
+            return self.inside(call, node)
         function, result = outlined
-        numbers = numbers_of(shape, call.frame, read, self.e.lower)
-        targets = tuple(self.e.lower.new(type) for type in types_of(result))
-        self.e.lower.out.append(ir.Invoke(targets, function, tuple(numbers)))
+        numbers = numbers_of(shape, call.frame, read, self.lower)
+        targets = tuple(self.lower.new(type) for type in types_of(result))
+        self.lower.out.append(ir.Invoke(targets, function, tuple(numbers)))
         return build(result, iter(targets))
 
     def _tried(
         self,
         call: Call,
-        node: ast.FunctionDef | ast.Lambda,
+        node: Tree,
         shape: Shape,
         chosen: dict[ir.Var, frozenset[int]],
     ) -> tuple[ir.Outlined, Shape] | None:
-        parameters = tuple(self.e.lower.new(type) for type in types_of(shape))
+        parameters = tuple(self.lower.new(type) for type in types_of(shape))
         copies: dict[int, Any] = {}
         frame = build(shape, iter(parameters), copies)
         assert isinstance(frame, Frame)
         facts = Facts()
-        facts.meanings, facts.domains = self.e.lower.facts.meanings, self.e.lower.facts.domains
+        facts.meanings, facts.domains = self.lower.facts.meanings, self.lower.facts.domains
         for tag, left in chosen.items():
             facts.others[tag] = facts.domains[tag] - left
 
         def run() -> Any:
-            value = self.e.inside(replace(call, frame=frame, base=frame), node)
-            form = shape_of(value, read, "", Memo(self.e.fixed))
-            return form, tuple(numbers_of(form, value, read, self.e.lower)), value
+            value = self.inside(replace(call, frame=frame, base=frame), node)
+            form = shape_of(value, read, "", Memo(self.fixed))
+            return form, tuple(numbers_of(form, value, read, self.lower)), value
 
         try:
-            path = self.e.paths.followed(run, facts)
+            path = self.paths.followed(run, facts)
         except (Refused, Promote):
             return None
         boxes = [x for x in copies.values() if isinstance(x, Box)]

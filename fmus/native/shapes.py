@@ -144,7 +144,6 @@ def shape_of(value: Any, slots: Place, path: str = "", memo: Memo | None = None)
         return made
     if isinstance(value, v.Closure):
         of = value.source, value.defaults, value.named_defaults
-
         if not all(map(_never_changes, (*value.defaults, *value.named_defaults.values()))):
             raise Refused("a function whose default arguments are only known at run time")
 

@@ -16,10 +16,14 @@ from types import FunctionType
 from typing import Any
 
 from . import ir
+from .calls import call
 from .evaluate import Evaluator
+from .expressions import EXPRESSIONS
+from .loops import LOOPS
 from .outline import Library
 from .read import Sources
 from .shapes import Growing, Memo, Promote, Shape, Widening, build, numbers_of, shape_of, types_of
+from .statements import STATEMENTS
 from .values import (
     OF_RING,
     OF_TABLE,
@@ -35,6 +39,8 @@ from .values import (
     read,
 )
 
+UNDERSTOOD = EXPRESSIONS | STATEMENTS | LOOPS
+"""Kinds of nodes of the syntax tree that are understood, with what evaluates them."""
 WIDEST = 40
 """Largest number of evaluations of a step until the shape of the state converges."""
 MOST_NUMBERS = 5000
@@ -43,8 +49,6 @@ MOST_IN_ARRAYS = 32_768
 """Largest number of numbers in the arrays of a function; chosen: they take 256 KiB of its stack."""
 STACK = 512 * 1024 * 1024
 """Stack of the translating thread [bytes], since nested calls are evaluated by nested calls."""
-
-
 BASE = "fmi/"
 """Folder of the base class of components, whose lines say nothing about a component."""
 HOOKS = ("configure", "start", "advance", "output")
@@ -258,7 +262,7 @@ class _Specialising:
     def _run(self, method: str, attributes: dict[str, Any], *args: Any) -> tuple[Instance, Evaluator]:
         me = Instance(self.component, {**attributes, "p": self.parameters})
         fixed = self.fixed if method == "configure" else self.all_fixed
-        evaluator = Evaluator(self.sources, fixed, self.libraries[method == "configure"])
+        evaluator = Evaluator(UNDERSTOOD, call, self.sources, fixed, self.libraries[method == "configure"])
         evaluator.lower.facts.domains |= self.domains
         evaluator.paths.choosers |= set(self.domains)
         try:

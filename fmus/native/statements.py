@@ -8,14 +8,12 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from .evaluate import Evaluator
 from .operators import BINARY
 from .stack import BREAK, CONTINUE, RESULT, RETURN
 from .values import Array, Closure, Dict, Failure, List, Refused, Ring, Text, Union
-
-if TYPE_CHECKING:
-    from .evaluate import Evaluator
 
 
 def _assign(e: Evaluator, node: ast.Assign) -> None:

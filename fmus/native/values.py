@@ -21,12 +21,8 @@ from .ir import Refused as Refused
 
 RESIZED = "a list that changes its length during iteration"
 """Message of `Refused`: Python's loop would use the list's new length, the translated loop the old."""
-
-
 EITHER = "a number that is True or False on some paths, another integer on others"
 """Message of `Refused` where the difference matters."""
-
-
 OF_TABLE = "an object of a table whose index is only known at run time"
 OF_RING = "an item of a list whose length changes"
 SHARED = "an object with two names"
@@ -55,8 +51,6 @@ class _Any:
 
 ANY = _Any()
 """Marker of a value that is never used."""
-
-
 _numbers = itertools.count()
 
 

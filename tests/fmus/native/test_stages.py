@@ -12,6 +12,7 @@ import pytest
 from tests.refusals import refused
 from yawbench.fmus.compiler import compiler_command
 from yawbench.fmus.native import ir
+from yawbench.fmus.native.built_in import FUNCTIONS
 from yawbench.fmus.native.emit import constant, quoted
 from yawbench.fmus.native.lower import Lowering
 from yawbench.fmus.native.read import Sources, kinds_within, names_within
@@ -115,6 +116,15 @@ def test_what_hangs_on_an_input_becomes_a_statement(construct, tmp_path):
     kinds = [type(statement) for statement in ir.every(function.body)]
     assert {kind: kinds.count(kind) for kind in expected} == expected
     assert kinds if expected else not kinds
+
+
+def test_an_entry_of_a_table_is_all_that_a_construct_needs(tmp_path, monkeypatch):
+    erf = "def output(self, t, u):\n    return (math.erf(u[0]),)"
+    with refused(Refused, names=("small.py", "math.erf")):
+        output_of(erf, tmp_path)
+    monkeypatch.setitem(FUNCTIONS, math.erf, lambda e, x: e.lower.let(ir.REAL, "erf", x))
+    (statement,) = output_of(erf, tmp_path).body
+    assert isinstance(statement, ir.Let) and statement.op == "erf"
 
 
 # ---- lower --------------------------------------------------------------------------------------
