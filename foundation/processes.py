@@ -46,8 +46,8 @@ CLOSING = 1.0
 """Time that a process has to end after it has closed its pipe [s]."""
 LOOK_EVERY = 100
 """Interval between looks at the time limit while an answer is awaited [ms]."""
-TEXT = 0x20000000
-"""Number of bytes as which text in place of a record is not taken for its length."""
+TEXT = 1 << 32
+"""Largest record of a process that runs FMUs [B]; chosen: text in its place passes for a longer one."""
 GARBAGE = 50_000
 """New objects after which copies of the fork server search for garbage. Chosen: a figure makes more."""
 _PROGRAM = (
@@ -321,31 +321,55 @@ def _become(request: Request, shared: Sequence[int]) -> None:
 class Channel:
     """One process's ends of the two pipes, for records: a kind, and a content that can be pickled.
 
+    A `Connection` of multiprocessing does the same in twice the time, which isolated instances would pay in
+    every step.
+
     Args:
-        longest: records beyond this are refused with an OSError [B].
+        longest: largest record that is accepted [B].
     """
 
-    def __init__(self, reading: int, writing: int, longest: int | None = None) -> None:
-        self.reading = Connection(reading, writable=False)
-        self.writing = Connection(writing, readable=False)
+    def __init__(self, reading: int, writing: int, longest: float = math.inf) -> None:
+        self.reading = reading
+        self.writing = writing
         self._longest = longest
         self._alone = threading.Lock()  # an FMU may log from another thread
 
     def send(self, kind: str, content: Any = None, dumps: Callable[[Any], bytes] = pickle.dumps) -> None:
         """Write a record."""
-        record = dumps((kind, content))
+        data = dumps((kind, content))
+        rest = memoryview(len(data).to_bytes(_HEAD, "little") + data)
         with self._alone:
-            self.writing.send_bytes(record)
+            while rest:
+                rest = rest[os.write(self.writing, rest) :]
 
     def receive(self) -> tuple[str, Any]:
         """Return kind and content of the next record; raise `EOFError` if the other side is gone."""
-        kind, content = pickle.loads(self.reading.recv_bytes(self._longest))
+        size = int.from_bytes(self._read(_HEAD), "little")
+        if size > self._longest:
+            raise ValueError(f"a record of {size} bytes")
+        kind, content = pickle.loads(self._read(size))
         return kind, content
 
+    def _read(self, size: int) -> bytes:
+        data = os.read(self.reading, min(size, _PART))
+        if len(data) == size:
+            return data
+        read = bytearray(data)
+        while data and len(read) < size:
+            data = os.read(self.reading, min(size - len(read), _PART))
+            read += data
+        if len(read) < size:
+            raise EOFError
+        return bytes(read)
+
     def close(self) -> None:
-        for end in (self.reading, self.writing):
+        for descriptor in (self.reading, self.writing):
             with contextlib.suppress(OSError):
-                end.close()
+                os.close(descriptor)
+
+
+_HEAD = 8  # bytes of the size of a record
+_PART = 1 << 16  # bytes read at a time, as many as a pipe holds
 
 
 class ProcessLost(Exception):
@@ -371,7 +395,7 @@ class Process:
         unasked: kind of a record that the child may send at any time -> what is called with its content.
     """
 
-    longest: ClassVar[int | None] = TEXT
+    longest: ClassVar[float] = TEXT
     """Largest record that it may send [B]."""
 
     def __init__(
@@ -455,7 +479,7 @@ class Worker(Process):
         unasked: see `Process`; a function sends such records through `asking`.
     """
 
-    longest: ClassVar[int | None] = None
+    longest: ClassVar[float] = math.inf
 
     def __init__(
         self, preload: Iterable[str], unasked: Mapping[str, Callable[..., object]] | None = None
@@ -476,7 +500,7 @@ class Worker(Process):
         value, error, self.retires = self.hear("answer")
         return value, error
 
-    def telling(self) -> set[Connection]:
+    def telling(self) -> set[Connection | int]:
         """Return what can be read when it has answered or died."""
         return {self._channel.reading, *filter(None, [self.child.status])}
 

@@ -4,7 +4,7 @@ An FMU that crashes, calls exit, hangs or closes all files does so in the child:
 without its final record, and still has every row. So a run of third-party code never ends silently, and
 Ctrl-C always works, whatever the FMU does with signals.
 
-Chosen over isolating every third-party FMU by default, which costs 30 to 70 us per instance and step. This
+Chosen over isolating every third-party FMU by default, which costs 40 to 90 us per instance and step. This
 costs a fork, a few milliseconds per run, and nothing per step. It does not protect instances from each other:
 see `arithmetic` for what they may change for each other, and `isolation` for protection. It is used on Linux
 only.

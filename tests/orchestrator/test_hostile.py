@@ -69,7 +69,7 @@ def test_what_comes_through_the_pipe_and_is_no_answer_is_a_sentence(said, stays)
 
 def _say(said, stays):
     """Write bytes into the pipe in place of an answer, and wait or exit."""
-    os.write(processes.asking.writing.fileno(), said)
+    os.write(processes.asking.writing, said)
     if stays:
         time.sleep(60)
     os._exit(0)

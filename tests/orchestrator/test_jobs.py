@@ -6,13 +6,13 @@ import os
 import signal
 import subprocess
 import sys
-from multiprocessing.connection import Connection
 from pathlib import Path
 
 import pytest
 
 from tests.refusals import each_mentions, mentions, refused, texts_of
 from yawbench.fmus.fmu import Fmu, Variable
+from yawbench.foundation import processes
 from yawbench.foundation.errors import ResultsError, ScenarioError, SimulationError, YawbenchError
 from yawbench.foundation.workers import Pool
 from yawbench.orchestrator.results.reader import load_results
@@ -122,7 +122,6 @@ def test_ctrl_c_does_not_reach_a_run_even_while_its_process_starts(tmp_path):
 
 CALLER = """
 import sys
-from multiprocessing.connection import Connection
 from pathlib import Path
 from yawbench.studies.jobs import execute
 from tests.orchestrator.test_jobs import jobs, tell_and_wait
@@ -130,7 +129,6 @@ execute(jobs(Path(sys.argv[1]), "waits"), run=tell_and_wait)
 """
 SHARING = """
 import sys
-from multiprocessing.connection import Connection
 from pathlib import Path
 from yawbench.foundation.workers import Pool
 from tests.orchestrator.test_jobs import jobs, tell_and_wait
@@ -210,10 +208,13 @@ def test_a_worker_is_sent_an_fmu_once(monkeypatch):
     }
     fmus = [Fmu(name, Path(), Path(), "", "", "", "", variables, name) for name in ("one", "another")]
     sizes = []
-    send = Connection.send_bytes
-    monkeypatch.setattr(
-        Connection, "send_bytes", lambda self, data: (sizes.append(len(data)), send(self, data))
-    )
+
+    def measured(content, reduce, pickled=processes.pickled):
+        data = pickled(content, reduce)
+        sizes.append(len(data))
+        return data
+
+    monkeypatch.setattr(processes, "pickled", measured)
     with Pool(1) as workers:
         told = workers.map(title_of, [fmus[0], fmus[1], *fmus], range(4))
     assert [known[:3] for known in told] == [(fmus[k % 2].description, 99, k) for k in range(4)]

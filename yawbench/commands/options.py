@@ -154,7 +154,7 @@ class RunOptions:
         typer.Option(
             "--isolate",
             help="Run each instance in its own process: if its FMU crashes or hangs, the run ends with "
-            "an error and the results so far. Same numbers; 30 to 70 µs more per instance and step.",
+            "an error and the results so far. Same numbers; 40 to 90 µs more per instance and step.",
         ),
     ] = False
     call_limit: Annotated[
