@@ -151,7 +151,7 @@ def chapter_of(
 ) -> dict[str, Any]:
     """Return the template data of an experiment's page in its folder; `more`: further data."""
     from yawbench.orchestrator.results.freshness import staleness
-    from yawbench.orchestrator.results.run_folder import RUN_FILE
+    from yawbench.orchestrator.results.run_record import RUN_FILE
     from yawbench.reports.study_page import chapter
 
     jobs = findings.planned.jobs if findings.planned and not findings.spec.axes else []

@@ -17,7 +17,7 @@ from yawbench.metrics.expressions import MetricValue
 from yawbench.metrics.verdict import PERCENT, Status, Verdict, not_judged, worst
 from yawbench.orchestrator.plan import Plan
 from yawbench.orchestrator.results.reader import Results
-from yawbench.orchestrator.results.run_folder import RUN_FILE
+from yawbench.orchestrator.results.run_record import RUN_FILE
 
 from .axes import RUN, DesignPoint, Level
 from .claim_schema import Claim, LimitSpec, calculate
