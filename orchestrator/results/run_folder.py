@@ -137,8 +137,8 @@ def unfinished(folder: Path) -> RunRecord | None:
 
 def is_final(folder: Path) -> bool:
     """Return whether a run has ended but its files still have their temporary names."""
-    run = _record(folder / f"{RUN_FILE}{PART}")
-    return run.status.final and run.results in FILES.values()
+    run = _record(part := folder / f"{RUN_FILE}{PART}")
+    return is_regular(part) and run.status.final and run.results in FILES.values()
 
 
 def _record(path: Path) -> RunRecord:
