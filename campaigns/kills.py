@@ -31,7 +31,8 @@ from yawbench.fmus.build import build_all
 from yawbench.foundation.errors import ResultsError
 from yawbench.foundation.safe_files import LOCK_FILE, NEW
 from yawbench.orchestrator.results.reader import load_results
-from yawbench.orchestrator.results.run_folder import PART, RUN_FILE
+from yawbench.orchestrator.results.run_folder import PART
+from yawbench.orchestrator.results.run_record import RUN_FILE
 
 SWEEP = """
 title: Half a sweep

@@ -105,7 +105,7 @@ class Contexts:
         from yawbench.foundation import processes
 
         os.environ["YAWBENCH_TEST"] = test
-        processes.end_server()  # the next tells its children of this test
+        processes.server.close()  # the next tells its children of this test
         measured = coverage.Coverage.current()
         if measured is not None:
             measured.switch_context(test)

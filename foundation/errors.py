@@ -50,6 +50,8 @@ class Location:
     'a.yaml:3: units.plant.fmu'
     """
 
+    __pydantic_config__ = {"strict": False}
+
     file: Path | None = None
     line: int | None = None
     target: str = ""
@@ -78,6 +80,8 @@ class Diagnostic:
     >>> spinning.code, spinning.severity, spinning.location.signal
     ('car-spins', 'warning', 'plant.sideslip')
     """
+
+    __pydantic_config__ = {"strict": False}
 
     code: str
     message: str

@@ -50,22 +50,14 @@ def refuse_link(path: Path) -> None:
         raise OSError(errno.ELOOP, f"{path.name} is a symbolic link, which is not followed", str(path))
 
 
-def open_regular(path: Path, *, follow: bool = True) -> BinaryIO:
+def open_regular(path: Path) -> BinaryIO:
     """Open a regular file for reading, without blocking.
-
-    Args:
-        path: the file.
-        follow: whether to follow a symbolic link; False: refuse it.
 
     Raises:
         OSError: the file cannot be opened.
         ValueError: it is not a regular file, or not a valid path.
     """
-    flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
-    if not follow:
-        refuse_link(path)
-        flags |= NO_FOLLOW
-    descriptor = os.open(path, flags)
+    descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
     mode = os.fstat(descriptor).st_mode
     if stat.S_ISREG(mode):
         return open(descriptor, "rb")
@@ -75,19 +67,18 @@ def open_regular(path: Path, *, follow: bool = True) -> BinaryIO:
     raise ValueError("it is a pipe, a socket or a device, not a file")
 
 
-def read_bytes(path: Path, *, largest: int, follow: bool = True) -> bytes:
+def read_bytes(path: Path, *, largest: int) -> bytes:
     """Return the content of a regular file.
 
     Args:
         path: the file.
         largest: maximum size [bytes].
-        follow: whether to follow a symbolic link; False: refuse it.
 
     Raises:
         OSError: the file cannot be opened or read.
         ValueError: it is not a regular file, not a valid path, or larger than `largest`.
     """
-    with open_regular(path, follow=follow) as stream:
+    with open_regular(path) as stream:
         size = os.fstat(stream.fileno()).st_size
         if size > largest:
             raise ValueError(f"it is larger than {in_bytes(largest)}")
@@ -107,10 +98,9 @@ def reading(what: str, path: Path | str, error: type[YawbenchError]) -> Iterator
         yield
     except YawbenchError:
         raise
-    except RecursionError as cause:
-        raise error(f"{path}: cannot read this {what}: it is nested too deeply") from cause
-    except MemoryError as cause:
-        raise error(f"{path}: cannot read this {what}: it does not fit into the memory") from cause
+    except (RecursionError, MemoryError) as cause:
+        why = "is nested too deeply" if isinstance(cause, RecursionError) else "does not fit into the memory"
+        raise error(f"{path}: cannot read this {what}: it {why}") from cause
     except OSError as cause:
         raise error(f"{cause.filename or path}: cannot read this {what}: {reason(cause)}") from cause
     except Exception as cause:

@@ -441,10 +441,7 @@ def _name(program: Any) -> str:
     """Return the name of a program."""
     if isinstance(program, functools.partial):
         return _name(program.func)
-    try:
-        name = getattr(program, "__name__", None)
-    except Exception:
-        name = None
+    name = getattr(program, "__name__", None)
     if name == "<lambda>":
         return "function"
     return name if type(name) is str and name.isidentifier() else type(program).__name__

@@ -13,7 +13,8 @@ from yawbench.foundation.errors import ResultsError
 from yawbench.foundation.messages import counted, listed
 from yawbench.orchestrator.results.file_formats import RESULTS_FILE
 from yawbench.orchestrator.results.reader import found_runs, load_results
-from yawbench.orchestrator.results.run_folder import PART, RUN_FILE, RunStatus
+from yawbench.orchestrator.results.run_folder import PART
+from yawbench.orchestrator.results.run_record import RUN_FILE, RunStatus
 
 from . import arguments
 from ._dataset import dataset

@@ -30,8 +30,7 @@ from ..results.freshness import key_of
 from ..results.reader import Results
 from ..results.record_of_plan import recorded_variables, run_record, units_of
 from ..results.recorder import MemoryRecorder, Recorder, recorder_of
-from ..results.run_folder import RunStatus
-from ..results.run_record import DiagnosticRecord, EndRecord, ErrorRecord, WarningRecord
+from ..results.run_record import EndRecord, ErrorRecord, RunStatus, WarningRecord
 from .child_run import ChildRun, can_be_apart
 from .fmi import keeps, open_instance
 from .isolation import Isolation
@@ -284,7 +283,7 @@ class Simulation:
         record.wall_time, record.loop = self.wall_time, self.course.loop
         record.error = self._explained(error)
         record.units_freed = False
-        record.diagnostics = [*map(DiagnosticRecord.of, (*self.plan.diagnostics, *self.diagnostics))]
+        record.diagnostics = [*self.plan.diagnostics, *self.diagnostics]
         if ended is not None:
             record.ended = EndRecord(instance=ended.instance, time=ended.time, message=str(ended))
         self._note_warnings()

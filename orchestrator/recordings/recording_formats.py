@@ -19,18 +19,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from yawbench.foundation.errors import ScenarioError
+from yawbench.foundation.errors import ResultsError, ScenarioError
 from yawbench.foundation.messages import cut, hint, listed
 from yawbench.foundation.safe_files import read_bytes, reading, reason
 from yawbench.vocabulary.signals import SignalEntry
 
+from ..results.run_record import RUN_FILE, check_record
 from ..scenario.quantities import Unit, meant_unit, spellings
 from .text_tables import MISSING, Mark, read_text_table, split_header
 from .units_of_loggers import factors, stated_unit
 
 LARGEST = 1_000_000_000
 """Bytes of a file. Chosen: it fits into memory."""
-BESIDE = "run.json"
 _INDEXED = re.compile(r".*\w\[[\d, ]+\]\s*")
 TEXT, MDF = (".csv", ".tsv", ".txt", ".vbo"), (".mf4", ".mdf", ".dat")
 
@@ -258,19 +258,14 @@ def _units_beside(path: Path) -> Mapping[str, str]:
     Raises:
         ValueError: the run record cannot be read.
     """
-    if path.stem != "results":
+    beside = path.with_name(RUN_FILE)
+    if path.stem != "results" or not beside.exists():
         return {}
-    beside = path.parent / BESIDE
     try:
-        record = json.loads(read_bytes(beside, largest=LARGEST))
-    except FileNotFoundError:
-        return {}
-    except (OSError, ValueError, RecursionError) as error:
-        raise ValueError(f"the {BESIDE} beside it cannot be read: {reason(error)}") from None
-    if not isinstance(record, dict) or record.get("results", "results.csv") != path.name:
-        return {}
-    units = record.get("units")
-    return {str(name): str(unit) for name, unit in units.items() if unit} if isinstance(units, dict) else {}
+        record = check_record(json.loads(read_bytes(beside, largest=LARGEST)), beside)
+    except (OSError, ValueError, RecursionError, ResultsError) as error:
+        raise ValueError(f"the {RUN_FILE} beside it cannot be read: {reason(error)}") from None
+    return {name: unit for name, unit in record.units.items() if unit} if record.results == path.name else {}
 
 
 @contextlib.contextmanager

@@ -14,9 +14,7 @@ import csv
 import ctypes
 import functools
 import importlib
-import math
 import pkgutil
-import shutil
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -132,31 +130,18 @@ def expected_size(plan: Plan, format: str) -> int:
 
 
 def size_note(plan: Plan, folder: Path, format: str) -> str | None:
-    """Return a warning if the results will be huge or will not fit on the disk of `folder`, else None."""
-    size, free = expected_size(plan, format), _free(folder)
-    if size < HUGE and size <= free:
+    """Return a warning if the results will be huge, else None."""
+    size = expected_size(plan, format)
+    if size < HUGE:
         return None
     note = (
         f"{folder / FORMATS[format].file} will take about {in_bytes(size)} "
         f"({plan.n_steps + 1} rows of {len(plan.record)} variables)"
     )
-    if size > free:
-        note += f", and {in_bytes(free)} are free there"
     shorter = "name the variables that you need under 'record:' in the scenario"
     if format == "csv":
         return f"{note}; {shorter}, or take --format parquet ({in_bytes(expected_size(plan, 'parquet'))})"
     return f"{note}; {shorter}"
-
-
-def _free(folder: Path) -> float:
-    """Return the free bytes of the disk that a folder is, or will be, on."""
-    absolute = folder.absolute()
-    try:
-        return shutil.disk_usage(
-            next(folder for folder in (absolute, *absolute.parents) if folder.exists())
-        ).free
-    except OSError:
-        return math.inf
 
 
 REAL = np.dtype(float)
@@ -247,7 +232,7 @@ class CsvFile:
         self._path = path
         try:
             with open_regular(path) as stream:
-                lines = (_line(raw) for raw in iter(lambda: stream.readline(BLOCK), b""))
+                lines = (raw.decode() for raw in iter(lambda: stream.readline(BLOCK), b""))
                 self.names = [name.lstrip("\ufeff") for name in next(csv.reader(lines), [])]
                 self._begin = stream.tell()  # the header may span several lines
         except csv.Error as error:
@@ -275,9 +260,3 @@ class CsvFile:
                     yield [plain(values_of(column)) for column in batch]
             except pa.ArrowInvalid as error:
                 raise ValueError(" ".join(str(error).split())) from None
-
-
-def _line(raw: bytes) -> str:
-    if len(raw) == BLOCK:
-        raise ValueError(f"a line is longer than {BLOCK} bytes")
-    return raw.decode()

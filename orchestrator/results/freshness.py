@@ -18,8 +18,8 @@ from yawbench.foundation.errors import ResultsError
 
 from ..plan import Plan
 from .record_of_plan import PROGRAMS, WIRES, run_record, version_of
-from .run_folder import RUN_FILE, RunStatus, is_dead
-from .run_record import FmuRecord, RunRecord, load_record
+from .run_folder import is_dead, load_record
+from .run_record import RUN_FILE, FmuRecord, RunRecord, RunStatus
 
 
 def key_of(plan: Plan, also: Any = None) -> str:
@@ -51,25 +51,12 @@ def key_of(plan: Plan, also: Any = None) -> str:
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:32]
 
 
-COMPARED = {
-    "algorithm": "the algorithm has changed",
-    "step_size": "the communication step has changed",
-    "start_time": "the start time has changed",
-    "stop_time": "the stop time has changed",
-    "evaluation_order": "the order of the instances has changed",
-    "connections": "the wires have changed",
-    "faults": "the faults have changed",
-    "units": "the recorded signals have changed",
-    "title": "the scenario has changed",
-}
-"""Key of the run record -> explanation if it differs from the plan."""
-_OF_UNIT = {
-    "parameters": "parameters",
-    "constants": "constants",
-    "series": "time series",
-    "step_size": "step",
-    "tolerance": "tolerance",
-}
+OF_RUN = (
+    *("algorithm", "step_size", "start_time", "stop_time", "evaluation_order", "connections", "faults"),
+    *("units", "title"),
+)
+OF_INSTANCE = ("parameters", "constants", "series", "step_size", "tolerance")
+"""Keys of a record, and of an instance in it, that say what differs from a plan."""
 
 
 def staleness(plan: Plan, folder: Path) -> str | None:
@@ -93,16 +80,16 @@ def staleness(plan: Plan, folder: Path) -> str | None:
 def _reason(plan: Plan, recorded: RunRecord) -> str:
     """Return in words why the key of a record differs from that of a plan."""
     planned = run_record(plan, status=RunStatus.COMPLETED, started=datetime.now(timezone.utc))
-    for key, sentence in COMPARED.items():
+    for key in OF_RUN:
         if getattr(recorded, key) != getattr(planned, key):
-            return sentence
+            return f"{key.replace('_', ' ')}: changed"
     for instance, fmu in planned.fmus.items():
         known = recorded.fmus.get(instance, FmuRecord())
         if known.sha256 != fmu.sha256:
             return f"{instance}: another {fmu.name}.fmu"
-        for key, words in _OF_UNIT.items():
+        for key in OF_INSTANCE:
             if getattr(known, key) != getattr(fmu, key):
-                return f"{instance}: other {words}"
+                return f"{instance}: {key.replace('_', ' ')} changed"
     for program in (*PROGRAMS, "orchestrator"):
         version, earlier = planned.versions[program], recorded.versions.get(program, "an unknown one")
         if version != earlier:

@@ -15,8 +15,7 @@ from ..recordings.gaps import notes_on
 from ..recordings.measurement import ENDINGS, MEASURABLE, load_measurement
 from ..recordings.segment import LowPass, even_grid
 from .reader import Results, load_results
-from .run_folder import RunStatus
-from .run_record import DiagnosticRecord, FmuRecord, RunRecord
+from .run_record import FmuRecord, RunRecord, RunStatus
 
 STEERING = ("steering_wheel_angle", "steer_angle", "drive_force")
 """Measured signals that a driver gives in simulations."""
@@ -138,7 +137,7 @@ def measured_results(path: Path, start: float = 0.0) -> MeasuredResults:
             for role in ("driver", "plant")
         },
         scenario={"source": measurement.origin, "file": str(path)},
-        diagnostics=[DiagnosticRecord.of(note) for note in (*notes, *gaps)],
+        diagnostics=[*notes, *gaps],
         results="",
     )
     return MeasuredResults(path, segment.time - start, columns, units, record, measurement.filter)

@@ -24,8 +24,8 @@ from yawbench.foundation.safe_files import check_regular, reads, reason
 from ..scenario.quantities import conversion, measure_of
 from ..signal_names import SignalName
 from .file_formats import FILES, FORMATS, ResultsSource, load_class
-from .run_folder import PART, RUN_FILE, RunStatus, is_dead, unfinished
-from .run_record import ConnectionRecord, RunRecord, check_record, load_record
+from .run_folder import PART, is_dead, load_record, unfinished
+from .run_record import RUN_FILE, ConnectionRecord, RunRecord, RunStatus
 
 
 @dataclass(frozen=True)
@@ -66,12 +66,8 @@ def _runs_in(folder: Path) -> Iterator[FoundRun]:
     going = unfinished(folder)
     if going is not None:
         dead = is_dead(folder)
-        try:
-            record = check_record(going, folder / f"{RUN_FILE}{PART}")
-        except ResultsError:  # the run may have died before it had written its record
-            record = RunRecord()
         status = RunStatus.DIED if dead else RunStatus.RUNNING
-        yield FoundRun(folder, status, record, "it ended abnormally" if dead else "")
+        yield FoundRun(folder, status, going, "it ended abnormally" if dead else "")
     if going is not None and not os.path.lexists(folder / RUN_FILE):
         return
     try:

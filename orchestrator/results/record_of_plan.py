@@ -17,15 +17,14 @@ from yawbench.foundation.cache import OF_RESULTS, sources_hash
 
 from ..plan import DEFAULT, InputSeries, Instance, Plan, ValueSource, Wire
 from ..signal_names import SignalName
-from .run_folder import RunStatus
 from .run_record import (
     ConnectionRecord,
-    DiagnosticRecord,
     FaultRecord,
     FmuRecord,
     OverrideRecord,
     RecordedScenario,
     RunRecord,
+    RunStatus,
     SeriesRecord,
     SourceRecord,
 )
@@ -63,7 +62,7 @@ def run_record(plan: Plan, *, status: RunStatus, started: datetime) -> RunRecord
         changes=[OverrideRecord.model_validate(change.record) for change in plan.changes],
         connections=connections_of(plan),
         scenario=cast(RecordedScenario, plan.scenario),
-        diagnostics=[*map(DiagnosticRecord.of, plan.diagnostics)],
+        diagnostics=[*plan.diagnostics],
         versions=versions(),
     )
     if plan.faults:

@@ -24,8 +24,8 @@ from yawbench.foundation.safe_files import reason, write_whole
 from .file_formats import FORMATS, RESULTS_FILE, check_format, load_class, plain, rows_text
 from .folder_lock import FolderLock
 from .reader import Results
-from .run_folder import PART, RUN_FILE, put_in_place, tidy
-from .run_record import RunRecord
+from .run_folder import PART, put_in_place, tidy
+from .run_record import RUN_FILE, RunRecord
 
 BLOCK = 512
 """Rows buffered in memory before they are written."""
@@ -193,7 +193,12 @@ class Recorder(RowBlock):
         try:
             self._complete(record)
             os.fsync(self._file.fileno())
-            self._refuse_altered()
+            if not self._path.exists() or self._path.stat().st_size != self._size:
+                raise ResultsError(
+                    f"{self.folder / self._path.name}: was removed, cut off or lengthened by something else "
+                    "before the run had ended, and its rows are lost; run it again.",
+                    code="results-unwritable",
+                )
             self._write_record(record)
             self._file.close()
             self.written_to = self.folder / put_in_place(self._home).relative_to(self._home)
@@ -208,19 +213,6 @@ class Recorder(RowBlock):
             self._lock.release()
             way_out = f"; make room, then 'yawbench salvage {self.folder}' keeps the rows"
             raise self._unwritable(error, way_out) from None
-
-    def _refuse_altered(self) -> None:
-        """Check that the file is still there with all that was written to it.
-
-        Raises:
-            ResultsError: something else has removed, shortened or lengthened it.
-        """
-        if not self._path.exists() or self._path.stat().st_size != self._size:
-            raise ResultsError(
-                f"{self.folder / self._path.name}: was removed or changed by something else before the run "
-                "had ended, and its rows are lost; run it again.",
-                code="results-unwritable",
-            )
 
     def close(self, record: RunRecord | None = None) -> None:
         """Release the folder.

@@ -15,52 +15,20 @@ import contextlib
 import json
 import os
 import stat
-from enum import Enum
 from pathlib import Path
-from typing import Any
 
 from yawbench.foundation.errors import ResultsError
 from yawbench.foundation.messages import cut
-from yawbench.foundation.safe_files import NEW, read_bytes, refuse_link
+from yawbench.foundation.safe_files import NEW, read_bytes, reading, reason, refuse_link
 
-from .file_formats import FILES, RESULTS_FILE
+from .file_formats import FILES
 from .folder_lock import holder_of
+from .run_record import LARGEST, RUN_FILE, RunRecord, RunStatus, check_record
 
-RUN_FILE = "run.json"
 PART = ".part"
 """Suffix of a run's files until it has ended."""
-LARGEST = 100_000_000
-"""Largest size of a record [bytes]. Chosen: a thousand times that of ours."""
 FAILED = "failed"
 """Subfolder for the results of a failed run when the folder has those of a completed one."""
-
-
-class RunStatus(str, Enum):
-    """Status of a run, as its record has it."""
-
-    UNKNOWN = ""  # the record has none that is known
-    PLANNED = "planned"
-    RUNNING = "running"
-    COMPLETED = "completed"
-    FAILED = "failed"
-    INTERRUPTED = "interrupted"
-    DIED = "died"  # the process ended without a word; its results may be salvaged
-    UNREADABLE = "unreadable"  # the record cannot be read or has been changed
-
-    @classmethod
-    def _missing_(cls, value: object) -> RunStatus:
-        return cls.UNKNOWN
-
-    @property
-    def final(self) -> bool:
-        """Whether a run has ended with it."""
-        return self in (RunStatus.COMPLETED, RunStatus.FAILED, RunStatus.INTERRUPTED, RunStatus.DIED)
-
-
-def folder_for(folder: Path, status: RunStatus) -> Path:
-    """Return the folder for the results of a run that has ended with `status`."""
-    completed = RunStatus.COMPLETED
-    return folder if status is completed or _status(folder / RUN_FILE) is not completed else folder / FAILED
 
 
 def put_in_place(folder: Path) -> Path:
@@ -72,10 +40,11 @@ def put_in_place(folder: Path) -> Path:
         OSError: the files cannot be renamed.
     """
     part = folder / f"{RUN_FILE}{PART}"
-    run = _record(part, follow=False)
-    status = RunStatus(run.get("status"))
-    final = folder_for(folder, status)
-    file = _file_of(run)
+    run = _record(part)
+    status, file = run.status, run.results
+    completed = RunStatus.COMPLETED
+    keeps = status is not completed and _record(folder / RUN_FILE).status is completed
+    final = folder / FAILED if keeps else folder
     if final != folder:
         refuse_link(final)
         final.mkdir(exist_ok=True)
@@ -84,7 +53,7 @@ def put_in_place(folder: Path) -> Path:
     os.replace(part, final / RUN_FILE)
     for other in {*FILES.values()} - {file}:
         (final / other).unlink(missing_ok=True)
-    if final == folder and status is RunStatus.COMPLETED:
+    if status is completed:
         remove_results(folder / FAILED)
     return final
 
@@ -135,14 +104,18 @@ def refuse_dead(folder: Path) -> None:
 
 def death(folder: Path) -> str:
     """Return the message on a run that has died in a folder."""
-    begun = _record(folder / f"{RUN_FILE}{PART}", follow=False).get("started")
-    when = f" begun at {cut(begun, 60)}" if begun and isinstance(begun, str) else ""
+    begun = _record(folder / f"{RUN_FILE}{PART}").started
+    when = f" begun at {cut(begun, 60)}" if begun else ""
     if is_final(folder):
         return (
             f"{folder}: the run{when} was stopped before its results were in place; move them there "
             f"with 'yawbench salvage {folder}', or run it again."
         )
-    beside = "; the results of the run before it are read again then" if _status(folder / RUN_FILE) else ""
+    beside = (
+        "; the results of the run before it are read again then"
+        if _record(folder / RUN_FILE).status.final
+        else ""
+    )
     return (
         f"{folder}: the run{when} ended abnormally; run it again, or keep what it recorded with "
         f"'yawbench salvage {folder}'{beside}."
@@ -156,31 +129,52 @@ def is_dead(folder: Path) -> bool:
     return os.path.lexists(part) and holder_of(folder) is None and os.path.lexists(part)
 
 
-def unfinished(folder: Path) -> dict[str, Any] | None:
+def unfinished(folder: Path) -> RunRecord | None:
     """Return the record of a run that is going on or has died in a folder; None if there is none."""
     part = folder / f"{RUN_FILE}{PART}"
-    return _record(part, follow=False) if os.path.lexists(part) else None
+    return _record(part) if os.path.lexists(part) else None
 
 
 def is_final(folder: Path) -> bool:
     """Return whether a run has ended but its files still have their temporary names."""
-    run = _record(folder / f"{RUN_FILE}{PART}", follow=False)
-    return RunStatus(run.get("status")).final and _file_of(run) in FILES.values()
+    run = _record(part := folder / f"{RUN_FILE}{PART}")
+    return is_regular(part) and run.status.final and run.results in FILES.values()
 
 
-def _file_of(run: dict[str, Any]) -> str:
-    """Return the name of the results file that a record refers to."""
-    return str(run.get("results") or RESULTS_FILE)
-
-
-def _status(path: Path) -> RunStatus:
-    return RunStatus(_record(path).get("status"))
-
-
-def _record(path: Path, *, follow: bool = True) -> dict[str, Any]:
-    """Return a record without validating it; an empty dictionary if there is none."""
+def _record(path: Path) -> RunRecord:
+    """Return the record in a file; an empty one if there is none that can be read."""
     try:
-        content = json.loads(read_bytes(path, largest=LARGEST, follow=follow))
-    except (OSError, ValueError, RecursionError, MemoryError):
-        return {}
-    return content if isinstance(content, dict) else {}
+        return check_record(json.loads(read_bytes(path, largest=LARGEST)), path)
+    except (OSError, ValueError, RecursionError, MemoryError, ResultsError):
+        return RunRecord()
+
+
+def load_record(folder: Path, *, settled: bool = False) -> RunRecord:
+    """Read the record of the run whose results are in a folder.
+
+    Args:
+        folder: the results folder.
+        settled: read the record of earlier results even if the last run has died.
+
+    Raises:
+        ResultsError: there is none, it is not one that `yawbench run` writes, or the last run here has died.
+    """
+    if not settled:
+        refuse_dead(folder)
+    file = folder / RUN_FILE
+    with reading("record of a run", file, ResultsError):
+        try:
+            run = json.loads(read_bytes(file, largest=LARGEST).decode())
+        except FileNotFoundError:
+            failed = f"; those of a run that failed: {folder / FAILED}" if (folder / FAILED).exists() else ""
+            raise ResultsError(
+                f"{folder}: no results here, {RUN_FILE} is missing; make them with "
+                f"'yawbench run SCENARIO --out {folder}'{failed}.",
+                code="results-missing",
+            ) from None
+        except NotADirectoryError:
+            holds = f", {folder.parent}" if folder.name in (RUN_FILE, *FILES.values()) else ""
+            raise ResultsError(f"{folder}: is a file; name the folder of the results{holds}.") from None
+        except (OSError, ValueError) as error:
+            raise ResultsError(f"{file}: cannot be read: {reason(error)}") from None
+        return check_record(run, file)

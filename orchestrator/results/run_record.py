@@ -9,6 +9,7 @@ import contextlib
 import json
 import math
 from collections.abc import Mapping
+from enum import Enum
 from pathlib import Path
 from typing import Annotated, Any, Literal, cast
 
@@ -24,15 +25,42 @@ from pydantic import (
 from pydantic_core import PydanticKnownError
 from typing_extensions import TypedDict
 
-from yawbench.foundation.errors import Diagnostic, Location, ResultsError, Severity, warnings_in
+from yawbench.foundation.errors import Diagnostic, ResultsError, warnings_in
 from yawbench.foundation.messages import short
-from yawbench.foundation.safe_files import read_bytes, reading, reason
 from yawbench.vocabulary.roles import role_of
 
 from ..plan import NEUTRAL, Override, OverrideOrigin, SourceKind, ValueSource
 from ..signal_names import SignalName
-from .file_formats import FILES, RESULTS_FILE
-from .run_folder import FAILED, LARGEST, RUN_FILE, RunStatus, refuse_dead
+from .file_formats import RESULTS_FILE
+
+RUN_FILE = "run.json"
+LARGEST = 100_000_000
+"""Largest size of a record [bytes]. Chosen: a thousand times that of ours."""
+
+
+class RunStatus(str, Enum):
+    """Status of a run, as its record has it."""
+
+    UNKNOWN = ""  # the record has none that is known
+    PLANNED = "planned"
+    RUNNING = "running"
+    COMPLETED = "completed"
+    FAILED = "failed"
+    INTERRUPTED = "interrupted"
+    DIED = "died"  # the process ended without a word; its results may be salvaged
+    UNREADABLE = "unreadable"  # the record cannot be read or has been changed
+
+    @classmethod
+    def _missing_(cls, value: object) -> RunStatus:
+        return cls.UNKNOWN
+
+    @property
+    def final(self) -> bool:
+        """Whether a run has ended with it."""
+        return self in (RunStatus.COMPLETED, RunStatus.FAILED, RunStatus.INTERRUPTED, RunStatus.DIED)
+
+
+RecordedDiagnostic = Annotated[Diagnostic, PlainSerializer(Diagnostic.record)]
 
 
 class _Part(BaseModel):
@@ -132,41 +160,6 @@ NotFinite = Literal["nan", "inf", "-inf"]
 """Text for numbers that JSON cannot represent."""
 
 
-class LocationRecord(_Part):
-    """Location of a diagnostic; see `errors.Location`."""
-
-    file: str | None = None
-    line: int | None = None
-    target: str = ""
-    instance: str | None = None
-    signal: str | None = None
-    time: float | None = None
-
-
-class DiagnosticRecord(_Part):
-    """A diagnostic of a run; see `errors.Diagnostic`."""
-
-    code: str = ""
-    severity: Severity = "info"
-    message: str = ""
-    location: LocationRecord = LocationRecord()
-    value: float | NotFinite | None = None
-
-    @classmethod
-    def of(cls, diagnostic: Diagnostic) -> DiagnosticRecord:
-        """Return the record of a diagnostic."""
-        return cls.model_validate(diagnostic.record())
-
-    @property
-    def diagnostic(self) -> Diagnostic:
-        """The diagnostic of which this is the record."""
-        where, value = self.location, self.value
-        file = None if where.file is None else Path(where.file)
-        place = Location(file, where.line, where.target, where.instance, where.signal, where.time)
-        number = None if value is None else float(value)
-        return Diagnostic(self.code, self.message, self.severity, place, number)
-
-
 class WarningRecord(_Part):
     """A message of an instance that did not end the run, with its time [s] and FMI status."""
 
@@ -255,7 +248,7 @@ class RunRecord(_Part):
     changes: list[OverrideRecord] = []
     connections: list[ConnectionRecord] = []
     faults: list[FaultRecord] = []
-    diagnostics: list[DiagnosticRecord] = []
+    diagnostics: list[RecordedDiagnostic] = []
     scenario: RecordedScenario = {}
     versions: dict[str, str] = {}
     warnings: list[WarningRecord] = []
@@ -290,11 +283,10 @@ class RunRecord(_Part):
     @property
     def all_diagnostics(self) -> tuple[Diagnostic, ...]:
         """The diagnostics of the run."""
-        diagnostics = tuple(record.diagnostic for record in self.diagnostics)
         if (self.model_extra or {}).get("findings"):
             says = f"a run of version 0.2, which warns: see 'findings' in {RUN_FILE}"
-            return (*diagnostics, Diagnostic("earlier-warnings", says, "warning"))
-        return diagnostics
+            return (*self.diagnostics, Diagnostic("earlier-warnings", says, "warning"))
+        return tuple(self.diagnostics)
 
     @property
     def course_warnings(self) -> tuple[Diagnostic, ...]:
@@ -328,37 +320,6 @@ def _plain(value: Any) -> Any:
     if isinstance(value, float):
         return value if math.isfinite(value) else repr(value)
     return str(value)
-
-
-def load_record(folder: Path, *, settled: bool = False) -> RunRecord:
-    """Read the record of the run whose results are in a folder.
-
-    Args:
-        folder: the results folder.
-        settled: read the record of earlier results even if the last run has died.
-
-    Raises:
-        ResultsError: there is none, it is not one that `yawbench run` writes, or the last run here has died.
-    """
-    if not settled:
-        refuse_dead(folder)
-    file = folder / RUN_FILE
-    with reading("record of a run", file, ResultsError):
-        try:
-            run = json.loads(read_bytes(file, largest=LARGEST).decode())
-        except FileNotFoundError:
-            failed = f"; those of a run that failed: {folder / FAILED}" if (folder / FAILED).exists() else ""
-            raise ResultsError(
-                f"{folder}: no results here, {RUN_FILE} is missing; make them with "
-                f"'yawbench run SCENARIO --out {folder}'{failed}.",
-                code="results-missing",
-            ) from None
-        except NotADirectoryError:
-            holds = f", {folder.parent}" if folder.name in (RUN_FILE, *FILES.values()) else ""
-            raise ResultsError(f"{folder}: is a file; name the folder of the results{holds}.") from None
-        except (OSError, ValueError) as error:
-            raise ResultsError(f"{file}: cannot be read: {reason(error)}") from None
-        return check_record(run, file)
 
 
 def check_record(run: Any, file: Path) -> RunRecord:

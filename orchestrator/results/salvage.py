@@ -11,18 +11,8 @@ from yawbench.foundation.safe_files import open_own, reason, write_whole
 
 from .file_formats import FILES, RESULTS_FILE, CsvFile
 from .folder_lock import FolderLock
-from .run_folder import (
-    PART,
-    RUN_FILE,
-    RunStatus,
-    is_dead,
-    is_final,
-    is_regular,
-    put_in_place,
-    tidy,
-    unfinished,
-)
-from .run_record import check_record
+from .run_folder import PART, is_dead, is_final, is_regular, put_in_place, tidy, unfinished
+from .run_record import RUN_FILE, ErrorRecord, RunRecord, RunStatus
 
 WHY = "the process of this run ended abnormally"
 
@@ -47,21 +37,14 @@ def salvage(folder: Path) -> tuple[Path, int]:
     path = folder / f"{RESULTS_FILE}{PART}"
     lock = FolderLock(folder)
     try:
-        record = unfinished(folder) or {}
+        record = unfinished(folder) or RunRecord()
         if is_final(folder):
-            rows = record.get("rows")
-            return put_in_place(folder), rows if isinstance(rows, int) else 0
-        part = folder / f"{RUN_FILE}{PART}"
-        rows = _keep_whole_rows(path, check_record(record, part).texts) if is_regular(path) else 0
+            return put_in_place(folder), record.rows
+        rows = _keep_whole_rows(path, record.texts) if is_regular(path) else 0
         if rows:
-            ended = {
-                "status": RunStatus.DIED.value,
-                "rows": rows,
-                "size": path.stat().st_size,
-                "error": {"message": WHY},
-            }
-            known = {name: value for name, value in record.items() if name != "results"}
-            write_whole(part, check_record(known | ended, part).to_json())
+            record.status, record.error = RunStatus.DIED, ErrorRecord(message=WHY, instance=None)
+            record.rows, record.size, record.results = rows, path.stat().st_size, RESULTS_FILE
+            write_whole(folder / f"{RUN_FILE}{PART}", record.to_json())
             return put_in_place(folder), rows
         tidy(folder)
         return folder, 0

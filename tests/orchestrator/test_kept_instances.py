@@ -18,7 +18,7 @@ from yawbench.commands.new import begin
 from yawbench.fmus.archive import WANTED, is_native
 from yawbench.orchestrator.master import fmi
 from yawbench.orchestrator.master.log import Log
-from yawbench.orchestrator.results.run_folder import RUN_FILE
+from yawbench.orchestrator.results.run_record import RUN_FILE
 from yawbench.studies import jobs as jobs_module
 from yawbench.studies.jobs import Job, execute, keyed, ready, run_job
 from yawbench.studies.on_demand import StoredPlans

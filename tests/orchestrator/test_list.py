@@ -10,8 +10,7 @@ from tests.refusals import each_mentions, mentions
 from yawbench.metrics.expressions import columns_for, evaluate_all
 from yawbench.orchestrator.recordings.motion import LEAST_SPEED
 from yawbench.orchestrator.results.reader import found_runs, load_results
-from yawbench.orchestrator.results.run_folder import RunStatus
-from yawbench.orchestrator.results.run_record import FmuRecord, RunRecord
+from yawbench.orchestrator.results.run_record import FmuRecord, RunRecord, RunStatus
 from yawbench.orchestrator.scenario.loader import title_of
 from yawbench.reports.record_differences import differences
 from yawbench.studies.listings import runs_table
@@ -177,19 +176,19 @@ def test_without_a_word_the_list_shows_scenarios_by_name_then_vehicles(yawbench,
     assert kinds.index("vehicle") > kinds.index("sweep") > 0
 
 
-def test_a_run_whose_record_was_changed_is_listed_and_left_out_of_an_evaluation_by_name(yawbench, tmp_path):
+def test_a_run_whose_record_cannot_be_read_is_listed_and_left_out_of_evaluations(yawbench, tmp_path):
     for name in ("one", "other"):
         write(car(), tmp_path / name)
     file = tmp_path / "one" / "run.json"
-    file.write_text(file.read_text().replace('"plant.yaw_rate": "rad/s"', '"plant.yaw_rate": "deg/s"'))
-    sentence = f"{file}: is not what its run has written: 'units' was changed; run it again, or remove "
+    file.write_text(file.read_text().replace('"plant.yaw_rate": "rad/s"', '"plant.yaw_rate": 7'))
+    sentence = f"{file}: is not the record of a run: units.plant.yaw_rate: "
     (one,) = (run for run in found_runs(tmp_path) if run.status is RunStatus.UNREADABLE)
     assert one.problem.startswith(sentence)
     status, out, said = yawbench("evaluate", "step-steer", tmp_path / "one", "--no-figures")
     assert (status, out) == (2, "")
     assert said.startswith(sentence)
     _, _, said = yawbench("evaluate", "step-steer", tmp_path, "--no-figures")
-    assert mentions(said, "note", "run.json", "'units'")
+    assert mentions(said, "note", "run.json", "units.plant.yaw_rate")
     for command in (("plot", tmp_path / "one"), ("diff", tmp_path / "one", tmp_path / "other")):
         status, out, said = yawbench(*command)
         assert (status, out) == (2, "")

@@ -41,7 +41,7 @@ from yawbench.foundation.messages import printable
 from yawbench.foundation.safe_files import NO_FOLLOW
 from yawbench.orchestrator.results.file_formats import FILES
 from yawbench.orchestrator.results.reader import FoundRun, found_runs, load_results
-from yawbench.orchestrator.results.run_folder import RUN_FILE
+from yawbench.orchestrator.results.run_record import RUN_FILE
 from yawbench.orchestrator.scenario import loader
 from yawbench.reports.page_parts import Assets, Page, render, static
 from yawbench.reports.viewer import page

@@ -72,7 +72,7 @@ def _data_of(plan: Plan) -> dict[str, object]:
     from datetime import datetime, timezone
 
     from yawbench.orchestrator.results.record_of_plan import run_record
-    from yawbench.orchestrator.results.run_folder import RunStatus
+    from yawbench.orchestrator.results.run_record import RunStatus
 
     record = run_record(plan, status=RunStatus.PLANNED, started=datetime.now(timezone.utc)).content()
     return {key: record[key] for key in PLANNED if key in record}

@@ -153,7 +153,7 @@ def chapter_of(
 ) -> StudyPage:
     """Return what the page of an experiment in its folder shows; say which runs are out of date."""
     from yawbench.orchestrator.results.freshness import staleness
-    from yawbench.orchestrator.results.run_folder import RUN_FILE
+    from yawbench.orchestrator.results.run_record import RUN_FILE
     from yawbench.reports.study_page import chapter
 
     jobs = findings.planned.jobs if findings.planned and not findings.spec.axes else []

@@ -15,7 +15,7 @@ from yawbench.commands import output
 from yawbench.foundation.errors import ResultsError, ScenarioError
 from yawbench.foundation.messages import counted, listed
 from yawbench.metrics.verdict import NotJudged
-from yawbench.orchestrator.results.run_folder import RUN_FILE
+from yawbench.orchestrator.results.run_record import RUN_FILE
 from yawbench.proving_ground.standard_tests import DRIVEN, TESTS, Evaluation, StandardTest, TestSeries
 
 from .options import CHANGES, MAKING, RunOptions, executor_of, takes
@@ -306,7 +306,7 @@ def _runs(source: Path) -> list[Path]:
     """Return the folders of the runs in and below a folder, or the segments of a measurement file."""
     from yawbench.orchestrator.results.measurement_results import segments_of
     from yawbench.orchestrator.results.reader import found_runs
-    from yawbench.orchestrator.results.run_folder import RunStatus
+    from yawbench.orchestrator.results.run_record import RunStatus
 
     if not source.is_dir():
         return segments_of(source)

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from yawbench.foundation.errors import ResultsError
 from yawbench.orchestrator.plan import Override
 from yawbench.orchestrator.recordings.gaps import gaps_noted
-from yawbench.orchestrator.results.run_folder import RunStatus
+from yawbench.orchestrator.results.run_record import RunStatus
 from yawbench.orchestrator.scenario.overrides import changed, fmu_of
 
 from .display import LabelledRun, digits_of

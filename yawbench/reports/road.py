@@ -14,7 +14,7 @@ import numpy as np
 from yawbench.foundation.messages import listed
 from yawbench.metrics.expressions import columns_of
 from yawbench.orchestrator.results.reader import Results
-from yawbench.orchestrator.results.run_folder import RunStatus
+from yawbench.orchestrator.results.run_record import RunStatus
 from yawbench.vocabulary.friction_table import FrictionTable, table_of
 from yawbench.vocabulary.lane_change import lanes_of
 from yawbench.vocabulary.patches import Patch, Point, Span, patches_of

@@ -23,8 +23,8 @@ from yawbench.orchestrator.plan import Plan
 from yawbench.orchestrator.results.measurement_results import filtered_alike
 from yawbench.orchestrator.results.reader import Results
 from yawbench.orchestrator.results.record_of_plan import run_record
-from yawbench.orchestrator.results.run_folder import RunStatus
-from yawbench.orchestrator.results.run_record import RunRecord, load_record
+from yawbench.orchestrator.results.run_folder import load_record
+from yawbench.orchestrator.results.run_record import RunRecord, RunStatus
 from yawbench.orchestrator.scenario.loader import LoadedScenario
 from yawbench.orchestrator.scenario.overrides import changed
 from yawbench.planner import Planner

@@ -24,7 +24,7 @@ from yawbench.metrics.expressions import metric
 from yawbench.metrics.measures import variable_of
 from yawbench.orchestrator.plan import Override
 from yawbench.orchestrator.results.reader import load_results
-from yawbench.orchestrator.results.run_folder import RUN_FILE
+from yawbench.orchestrator.results.run_record import RUN_FILE
 from yawbench.studies.axes import RUN, Level, changes_at
 from yawbench.studies.claim_schema import MetricReference, si_number
 from yawbench.studies.experiment import Case

@@ -27,7 +27,7 @@ from yawbench.metrics.expressions import MetricValue, columns_of, evaluate, metr
 from yawbench.metrics.measures import words
 from yawbench.orchestrator.results.measurement_results import MeasuredResults
 from yawbench.orchestrator.results.reader import Results
-from yawbench.orchestrator.results.run_folder import RunStatus
+from yawbench.orchestrator.results.run_record import RunStatus
 from yawbench.orchestrator.scenario.overrides import with_changes
 
 from .page_parts import Assets, Document, Part, render, static, without_comments

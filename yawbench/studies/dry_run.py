@@ -20,7 +20,7 @@ from yawbench.foundation.messages import counted, in_bytes
 from yawbench.orchestrator.master.simulate import simulate
 from yawbench.orchestrator.plan import Plan
 from yawbench.orchestrator.results.file_formats import expected_size
-from yawbench.orchestrator.results.run_folder import RUN_FILE
+from yawbench.orchestrator.results.run_record import RUN_FILE
 
 from .axes import VariantSpec
 from .executor import Executor, left_to_do

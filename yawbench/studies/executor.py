@@ -23,7 +23,7 @@ from yawbench.foundation.errors import ResultsError, ScenarioError
 from yawbench.foundation.workers import Pool
 from yawbench.orchestrator.plan import Plan
 from yawbench.orchestrator.results.freshness import staleness
-from yawbench.orchestrator.results.run_folder import RUN_FILE
+from yawbench.orchestrator.results.run_record import RUN_FILE
 from yawbench.planner import Planner
 
 from .experiment import Case, LoadedExperiment, NamedRun, PlannedExperiment, plan_experiment
@@ -276,7 +276,7 @@ def left_to_do(
     """Return the jobs that are still to be run, in their order, and how many are finished; none twice.
 
     A job with metrics is finished if its key is in `records` and, where results are kept, they can be
-    read; any other job is finished if the key in its results matches. Warns of results that were edited.
+    read; any other job is finished if the key in its results matches.
 
     Args:
         jobs: with plans and keys.

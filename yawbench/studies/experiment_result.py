@@ -16,7 +16,7 @@ from yawbench.metrics.expressions import MetricValue
 from yawbench.metrics.verdict import PERCENT, Judged
 from yawbench.orchestrator.plan import Plan
 from yawbench.orchestrator.results.reader import Results
-from yawbench.orchestrator.results.run_folder import RUN_FILE
+from yawbench.orchestrator.results.run_record import RUN_FILE
 
 from .axes import DesignPoint
 from .claim_schema import Claim

@@ -34,7 +34,7 @@ from yawbench.metrics.expressions import evaluate, metric
 from yawbench.orchestrator.plan import Override, Plan
 from yawbench.orchestrator.results import freshness
 from yawbench.orchestrator.results.reader import Results, load_results
-from yawbench.orchestrator.results.run_folder import RunStatus
+from yawbench.orchestrator.results.run_record import RunStatus
 from yawbench.planner import Planner
 
 from .on_demand import StoredPlans

@@ -13,12 +13,13 @@ from array import array
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, ClassVar
 
 from pydantic import BaseModel, ConfigDict, Field, StrictFloat
 
-from yawbench.foundation.errors import Diagnostic, ResultsError
+from yawbench.foundation.errors import ResultsError
 from yawbench.foundation.safe_files import open_own, reason
+from yawbench.orchestrator.results.run_record import RecordedDiagnostic
 
 from .jobs import MeasuredRun, MetricValues
 
@@ -50,13 +51,13 @@ class _Entry(_Line):
 
     key: str
     values: dict[str, Annotated[tuple[StrictFloat, str], Field(strict=False)] | None]
-    diagnostics: list[dict[str, Any]] = []
+    diagnostics: list[RecordedDiagnostic] = []
     ended: str | None = None
 
     @property
     def record(self) -> MeasuredRun:
         """The line as a `MeasuredRun`."""
-        return MeasuredRun(_Packed(self.values), tuple(map(Diagnostic.of, self.diagnostics)), self.ended)
+        return MeasuredRun(_Packed(self.values), tuple(self.diagnostics), self.ended)
 
 
 class _Packed(Mapping[str, "tuple[float, str] | None"]):
@@ -151,7 +152,7 @@ class Journal:
                 _Entry(
                     key=key,
                     values={**record.values},
-                    diagnostics=[diagnostic.record() for diagnostic in record.diagnostics],
+                    diagnostics=[*record.diagnostics],
                     ended=record.ended,
                 )
             )
