@@ -50,9 +50,7 @@ COLUMNS = (RUN, "status", "reason", "warnings", "key")
 
 def problems_of(spec: ExperimentSpec, runs: Collection[str]) -> list[Problem]:
     """Return all mistakes in an experiment with these named runs."""
-    found = [
-        *_in_axes(spec), *_in_names(spec, runs), *_in_correlations(spec), *_in_limits(spec),
-    ]  # fmt: skip
+    found = [*_in_axes(spec), *_in_names(spec, runs), *_in_correlations(spec), *_in_limits(spec)]
     for i, figure in enumerate(spec.figures):
         problems = problems_of_figure(spec, runs, figure)
         if figure.name in [other.name for other in spec.figures[:i]]:
