@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from yawbench.fmus.fmu import Value
 from yawbench.foundation.errors import Diagnostic, ResultsError, ScenarioError
-from yawbench.foundation.messages import counted, listed, short
+from yawbench.foundation.messages import counted, listed
 from yawbench.orchestrator.scenario.schema_validation import made
 from yawbench.studies.axes import AxisSpec
 from yawbench.studies.claim_schema import DerivedSpec, MetricSource, MetricSpec
@@ -35,7 +35,6 @@ if TYPE_CHECKING:
 
 OBJECTIVE = "objective"
 """Name of the minimized number in the generated experiment."""
-SPACINGS = ("linear", "log")
 
 
 def tune(
@@ -139,11 +138,7 @@ def _axes(ranges: Any) -> dict[str, AxisSpec]:
         parts = arguments.items(ends, place, "lowest and highest value, (1e3, 1e5) or (1e3, 1e5, 'log')")
         if len(parts) not in (2, 3):
             arguments.refuse(place, "lowest and highest value, (1e3, 1e5) or (1e3, 1e5, 'log')", ends)
-        spacing = arguments.text(parts[2], f"{place}[2]") if len(parts) == 3 else SPACINGS[0]
-        if spacing not in SPACINGS:
-            raise ValueError(
-                f"{place}[2]: must be {listed(map(repr, SPACINGS), last='or')} (got {short(spacing)})"
-            )
+        spacing = arguments.text(parts[2], f"{place}[2]") if len(parts) == 3 else "linear"
         numbers = numbers_of(place, parts[:2])
         low, high = numbers.pop("values")
         between = {"from": low, "to": high, "spacing": spacing}

@@ -29,7 +29,7 @@ from yawbench.orchestrator.results.reader import Results
 from yawbench.orchestrator.results.run_record import ConnectionRecord, FmuRecord, RunRecord
 from yawbench.proving_ground.standard_tests import Evaluation
 from yawbench.reports.divergence import divergence, partings_table
-from yawbench.studies.evaluation_tables import run_table
+from yawbench.studies.driven_tests import run_table
 from yawbench.studies.listings import metrics_of_run
 from yawbench.vocabulary.wheels import WHEELS
 

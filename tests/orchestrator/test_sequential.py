@@ -12,8 +12,8 @@ import pytest
 from tests.checkout import ROOT
 from tests.verdicts import table_in
 from yawbench.studies.axes import RegionSpec, hypercube
+from yawbench.studies.claims import ONE_IN
 from yawbench.studies.confidence import TAIL, Decision, SequentialTest, share_bounds
-from yawbench.studies.region_verdicts import ONE_IN
 
 PAGE = ROOT / "docs" / "regions.md"
 CLAIMS = 1000

@@ -261,7 +261,7 @@ FIGURES_REFUSED = [
     ("of: amplitude", "of: control", "the values of 'control' must be numbers"),
     ("at_most: 100 N.m", "at_most: 100 N.m, above: 1", "needs exactly one of above, at_least, below"),
     ("at_most: 100 N.m", "at_most: many", "must be a number, a number with its unit"),
-    ("kind: limit, limit: gentle", "kind: limit, limit: gentle, metric: moment", "needs limit and no metric"),
+    ("kind: limit, limit: gentle", "kind: limit, limit: gentle, metric: moment", "a limit has no metric"),
     ("lines: control}", "lines: control, only: {amplitude: [0.07]}}", "has no value 0.07; did you"),
 ]  # fmt: skip
 

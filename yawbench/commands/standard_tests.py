@@ -260,7 +260,7 @@ class EvaluatedRuns:
         """
         from yawbench.foundation.safe_files import write_whole
         from yawbench.reports.evaluation_page import evaluation_page
-        from yawbench.studies.evaluation_tables import run_table, runs_table
+        from yawbench.studies.driven_tests import run_table, runs_table
 
         drawn = self._draw(each=each, together=together)
         data = {

@@ -22,7 +22,7 @@ from yawbench.orchestrator.results.reader import Results, load_results
 from yawbench.orchestrator.results.run_record import RunRecord
 from yawbench.proving_ground.standard_tests import Evaluation, Limit, StandardTest, TestSeries
 from yawbench.proving_ground.trace import Trace
-from yawbench.studies.evaluation_tables import run_table, runs_table
+from yawbench.studies.driven_tests import run_table, runs_table
 from yawbench.studies.result_tables import margin_words
 from yawbench.studies.tables import Table
 from yawbench.vocabulary.signals import SIGNALS

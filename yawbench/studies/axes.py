@@ -38,21 +38,16 @@ AxisKind = Literal["setting", "fmu", "file", "variant"]
 
 
 def _targets(value: object) -> list[Target]:
-    given: list[Any] = value if isinstance(value, list) else [value]
-    if not given or not all(isinstance(one, Target) or (isinstance(one, str) and one) for one in given):
-        raise ValueError(
-            "must be instance.parameter, vehicle.parameter, inputs.pattern, an instance, vehicle or tyres "
-            f"(got {short(value)})"
-        )
-    return [one if isinstance(one, Target) else Target.parse(one) for one in given]
+    return [_target(one) for one in value] if isinstance(value, list) and value else [_target(value)]
 
 
 def _target(value: object) -> Target:
-    if isinstance(value, Target):  # in data that another specification holds
+    if isinstance(value, Target):  # made already
         return value
-    if not isinstance(value, str):
+    if not isinstance(value, str) or not value:
         raise ValueError(
-            f"must be instance.parameter, vehicle.parameter or inputs.pattern (got {short(value)})"
+            "must be instance.parameter, vehicle.parameter, inputs.pattern, an instance, vehicle or tyres "
+            f"(got {short(value)})"
         )
     return Target.parse(value)
 

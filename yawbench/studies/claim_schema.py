@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import re
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal, get_args
 
@@ -58,28 +59,29 @@ def si_number(value: float | str, unit: str) -> float:
     return float(convert(value, "1" if unit == "%" else unit) if isinstance(value, str) else value)
 
 
-def _number(value: object) -> float | int:
-    if not is_finite(value):
-        raise ValueError(f"must be a number (got {short(value)})")
-    return value  # type: ignore[return-value]
-
-
 def is_quantity(value: object) -> bool:
     """Return whether a value is a number, or text that begins with one."""
     return is_finite(value) or (isinstance(value, str) and re.match(r"\s*[+-]?\.?\d", value) is not None)
 
 
-def _quantity(value: object) -> float | str:
-    if not is_quantity(value):
-        raise ValueError(f"must be a number, or a number with its unit ('5 %') (got {short(value)})")
-    return value  # type: ignore[return-value]
+def _only(allowed: Callable[[object], bool], wanted: str) -> PlainValidator:
+    def check(value: object) -> Any:
+        if not allowed(value):
+            raise ValueError(f"must be {wanted} (got {short(value)})")
+        return value
+
+    return PlainValidator(check)
 
 
 _NUMBER = {"type": "number"}
 _QUANTITY = {"anyOf": [_NUMBER, {"type": "string", "pattern": r"^\s*[+-]?\.?\d"}]}
 
-Number = Annotated[float | int, PlainValidator(_number), WithJsonSchema(_NUMBER)]
-QuantityText = Annotated[float | int | str, PlainValidator(_quantity), WithJsonSchema(_QUANTITY)]
+Number = Annotated[float | int, _only(is_finite, "a number"), WithJsonSchema(_NUMBER)]
+QuantityText = Annotated[
+    float | int | str,
+    _only(is_quantity, "a number, or a number with its unit ('5 %')"),
+    WithJsonSchema(_QUANTITY),
+]
 """A number in SI units, or text with a number and its unit."""
 
 
@@ -272,14 +274,9 @@ class MetricReference(StrictModel):
     times: float = 1.0
 
 
-def _bound(value: object) -> Any:
-    if not is_quantity(value):
-        raise ValueError("must be a number, a number with its unit ('5 %'), or {run: ..., metric: ...}")
-    return value
-
-
+_BOUND = "a number, a number with its unit ('5 %'), or {run: ..., metric: ...}"
 Bound = Annotated[
-    Annotated[float | int | str, PlainValidator(_bound), WithJsonSchema(_QUANTITY), Tag("number")]
+    Annotated[float | int | str, _only(is_quantity, _BOUND), WithJsonSchema(_QUANTITY), Tag("number")]
     | Annotated[MetricReference, Tag("reference")],
     Discriminator(lambda value: "reference" if isinstance(value, (dict, MetricReference)) else "number"),
 ]

@@ -1,4 +1,4 @@
-"""Standard tests that are driven: a test decides from run to run what it needs, a `TestDriver` makes it."""
+"""Standard tests: driven, as a test decides from run to run what it needs; and the tables of their runs."""
 
 from __future__ import annotations
 
@@ -8,19 +8,28 @@ from functools import cached_property
 from pathlib import Path
 from typing import Final
 
-from yawbench.foundation.errors import ScenarioError
+from yawbench.foundation.errors import ScenarioError, text_of
+from yawbench.metrics.expressions import MetricValue
+from yawbench.metrics.verdict import worded
 from yawbench.orchestrator.plan import Override, Plan
 from yawbench.orchestrator.results.reader import load_results
 from yawbench.orchestrator.scenario.loader import LoadedScenario
 from yawbench.orchestrator.scenario.quantities import convert
 from yawbench.proving_ground.sine_with_dwell import AMPLITUDE, SIDES
-from yawbench.proving_ground.standard_tests import Evaluation, SeriesRun, StandardTest
+from yawbench.proving_ground.standard_tests import (
+    Evaluation,
+    SeriesRun,
+    StandardTest,
+    TestQuantity,
+    TestSeries,
+)
 from yawbench.proving_ground.steering_tests import SLOW_STEER, slow_steer_amplitude
 from yawbench.proving_ground.trace import Trace, trace_of
 
 from .executor import Executor, highest_passing, side_by_side
 from .experiment import NamedRun, experiment_of
 from .jobs import Job, planned
+from .tables import Cell, Table
 
 ORIGIN: Final = "standard test"
 """Origin of the overrides by which a test varies its scenario."""
@@ -122,3 +131,40 @@ def slow_steer_runs(scenario: Path, changes: Sequence[Override], execute: Execut
         SeriesRun(folder, folder, {AMPLITUDE: side * amplitude}, partly=False)
         for folder, side in folders.items()
     ]
+
+
+def _cell(quantity: TestQuantity | None) -> Cell:
+    if quantity is None or quantity.value is None:
+        return None
+    return MetricValue(quantity.value, quantity.shown_in)
+
+
+def run_table(judged: Evaluation, title: str) -> Table:
+    """Return the table of a standard test's run: a row per quantity with its reading, verdicts as notes."""
+    rows: list[Sequence[Cell]] = [
+        [quantity.name, _cell(quantity), quantity.reading] for quantity in judged.quantities.values()
+    ]
+    notes = [f"{name}: {result}" for name, result in judged.criteria.items()]
+    return Table(
+        f"{judged.label}: {title}",
+        ["quantity", "value", "reading"],
+        rows,
+        [*notes, *map(str, judged.diagnostics)],
+    )
+
+
+def runs_table(runs: Sequence[Evaluation], test: StandardTest, series: TestSeries | None) -> Table:
+    """Return the table of a standard test's runs, in the given order, with the series' verdict as notes."""
+    keys = [key for key in test.columns if any(key in run.quantities for run in runs)]
+    names = {key: run.quantities[key].name for run in reversed(runs) for key in keys if key in run.quantities}
+    criteria = list(dict.fromkeys(name for run in runs for name in run.criteria))
+    rows: list[Sequence[Cell]] = []
+    for run in runs:
+        words = [worded(run.criteria[name].status) if name in run.criteria else "-" for name in criteria]
+        rows.append([run.label, *(_cell(run.quantities.get(key)) for key in keys), *words])
+    notes = []
+    if series:
+        notes += [f"{name}: {result}" for name, result in series.criteria.items()]
+        notes.append(series.summary)
+    notes += [f"{run.label}: {text_of(run.diagnostics)}" for run in runs if run.diagnostics]
+    return Table(test.says, ["run", *(names[key] for key in keys), *criteria], rows, notes)

@@ -20,12 +20,11 @@ from yawbench.orchestrator.results.run_record import RUN_FILE
 
 from .axes import DesignPoint
 from .claim_schema import Claim
-from .claims import ClaimResult, comparisons
+from .claims import ClaimResult, Region, comparisons
 from .confidence import interval, share_bounds
 from .derived import MetricTable, derive
 from .experiment import Case, LoadedExperiment, NamedRun, PlannedExperiment, metrics_of
 from .jobs import NOT_MADE, MeasuredRun, Outcome, measured, read_back
-from .region_verdicts import Region
 from .schema import ExperimentSpec
 from .sections import sections
 

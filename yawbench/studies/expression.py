@@ -55,9 +55,7 @@ class Expression:
             plain = isinstance(node, ast.Constant) and type(node.value) in (int, float)
             if not (plain or isinstance(node, (ast.Name, ast.BinOp, ast.UnaryOp))):
                 raise ValueError(f"{text!r}: only numbers, names, + - * / and parentheses are allowed")
-            if isinstance(node, ast.BinOp) and type(node.op) not in _OPERATIONS:
-                raise ValueError(f"{text!r}: only + - * / are allowed")
-            if isinstance(node, ast.UnaryOp) and not isinstance(node.op, ast.USub):
+            if isinstance(node, (ast.BinOp, ast.UnaryOp)) and type(node.op) not in (*_OPERATIONS, ast.USub):
                 raise ValueError(f"{text!r}: only + - * / are allowed")
         return cls(tree, text)
 

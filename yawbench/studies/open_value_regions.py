@@ -24,13 +24,12 @@ from yawbench.planner import Planner
 
 from .axes import DesignPoint, Level, OpenValueSpec, OpenVariantSpec, changes_at, latin_hypercube, levels_of
 from .claim_schema import Claim, MetricReference
-from .claims import judge
+from .claims import ONE_IN, TIMES, LevelVerdict, OpenValueScan, Region, judge
 from .confidence import Decision, SequentialTest
 from .derived import derive, ranked
 from .experiment import RUNS, LoadedExperiment, NamedRun, PlannedExperiment, metrics_of, number_of
 from .experiment_result import ExperimentResult
 from .jobs import Job, MeasuredRun, keyed, ready
-from .region_verdicts import ONE_IN, TIMES, LevelVerdict, OpenValueScan, Region
 
 ORIGIN: Final = "region"
 """Origin of overrides that open values make."""

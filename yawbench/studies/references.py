@@ -50,10 +50,7 @@ COLUMNS = (RUN, "status", "reason", "warnings", "key")
 
 def problems_of(spec: ExperimentSpec, runs: Collection[str]) -> list[Problem]:
     """Return all mistakes in an experiment with these named runs."""
-    found = [
-        *_in_axes(spec), *_in_names(spec, runs), *_in_correlations(spec), *_in_limits(spec),
-        *_in_sections(spec),
-    ]  # fmt: skip
+    found = [*_in_axes(spec), *_in_names(spec, runs), *_in_correlations(spec), *_in_limits(spec)]
     for i, figure in enumerate(spec.figures):
         problems = problems_of_figure(spec, runs, figure)
         if figure.name in [other.name for other in spec.figures[:i]]:
@@ -117,7 +114,7 @@ def _unknown(
 
 
 def _in_axes(spec: ExperimentSpec) -> Iterator[Problem]:
-    """Yield targets that two axes, or an axis and `set` or `swap`, override, and names of other columns."""
+    """Yield targets of two axes, or of an axis and `set` or `swap`; sections; names of other columns."""
     seen: dict[Target, str] = dict.fromkeys(spec.targets, "set and swap")
     for name, axis in spec.axes.items():
         for target in axis.targets:
@@ -125,17 +122,14 @@ def _in_axes(spec: ExperimentSpec) -> Iterator[Problem]:
                 also = f"axis {seen[target]!r}" if seen[target] in spec.axes else "set or swap"
                 yield Problem(("axes", name), f"{target} is given by {also} already", "name-duplicate")
             seen[target] = name
+    for section in sections() if spec.axes else ():
+        if getattr(spec, section, None):
+            yield Problem((section,), "is about named runs, not about runs along axes")
     for group, names in (("axes", spec.axes), ("metrics", spec.metrics)):
         for name in names:
             if name in COLUMNS or (group == "axes" and name in spec.metrics):
                 taken = f"{name!r} is the name of another column of the table"
                 yield Problem((group, name), taken, "name-duplicate")
-
-
-def _in_sections(spec: ExperimentSpec) -> Iterator[Problem]:
-    for section in sections():
-        if spec.axes and getattr(spec, section, None):
-            yield Problem((section,), "is about named runs, not about runs along axes")
 
 
 def _in_names(spec: ExperimentSpec, runs: Collection[str]) -> Iterator[Problem]:

@@ -20,10 +20,9 @@ from yawbench.metrics.measures import si
 from yawbench.orchestrator.results.reader import Results
 
 from .claim_schema import si_number, text_of
-from .claims import ClaimResult
+from .claims import ClaimResult, Region
 from .experiment_result import ExperimentResult
 from .limits import limits_of
-from .region_verdicts import Region
 from .result_tables import heading, measured_words, verdict
 from .tables import Table, column, to_csv
 

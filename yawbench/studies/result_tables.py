@@ -8,7 +8,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 from yawbench.figures.display import DIGITS, digits_apart, digits_of, shown
-from yawbench.foundation.messages import counted
 from yawbench.metrics.expressions import MetricValue, metric
 from yawbench.metrics.verdict import Status, Verdict, VerdictText, worded
 from yawbench.orchestrator.scenario.overrides import changed
@@ -176,9 +175,7 @@ def verdict(result: ClaimResult) -> VerdictText:
 
 def measured_words(result: ClaimResult) -> list[str]:
     """Return what was measured for each condition of a claim; along axes, where the claim holds."""
-    if result.held_at:
-        return [f"holds at {result.held_at[0]} of {counted(result.held_at[1], 'point')}"]
-    return [*dict.fromkeys(map(_comparison_words, result.compared))]
+    return [*dict.fromkeys(map(_comparison_words, result.compared))] or [result.verdict.why]
 
 
 def _comparison_words(comparison: Comparison) -> str:

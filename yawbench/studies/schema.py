@@ -254,6 +254,19 @@ class FigureKind:
         """Whether it is drawn over axes of the experiment."""
         return self.shows in ("metric", "limit")
 
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """The keys that such a figure must have."""
+        of_runs = ("panels",) if self.shows == "runs" else ()
+        return (self.shows, *of_runs, *("x",) * self.over_axes, *("y",) * self.upwards)
+
+    @property
+    def takes(self) -> tuple[str, ...]:
+        """The keys that such a figure may have besides."""
+        of_axes = ("only", "panels", *("lines",) * (not self.upwards)) if self.over_axes else ()
+        of_scale = () if self.shows == "runs" else ("scale", "largest", *("mark",) * (self.shows != "limit"))
+        return (*of_axes, *of_scale)
+
 
 FIGURE_KINDS = {
     "overlay": FigureKind("runs"),
@@ -323,40 +336,17 @@ class FigureSpec(StrictModel):
 
     @model_validator(mode="after")
     def _complete(self) -> FigureSpec:
-        shows, upwards = self.what.shows, self.what.upwards
-        if shows == "runs":
-            extra = self.model_fields_set - {"name", "title", "kind", "runs", "panels"}
-            if not self.runs or not isinstance(self.panels, list) or not self.panels or extra:
-                also = f", no {min(extra)}" if extra else ""
-                raise ValueError(f"an overlay needs runs and a list of panels{also}; else give its kind")
-            return self
-        if shows == "grid":
-            extra = self.model_fields_set - {"name", "title", "kind", "grid", "scale", "largest", "mark"}
-            if not self.grid or extra:
-                raise ValueError(f"a grid needs grid{f' and no {min(extra)}' if extra else ''}")
-            return self
-        if self.runs or ("panels" in self.model_fields_set and not self.panel_axis):
-            raise ValueError(f"a {self.kind} has no runs; its panels are those of one axis")
-        other = "metric" if shows == "limit" else "limit"
-        if not getattr(self, shows) or getattr(self, other) or self.grid:
-            raise ValueError(f"a {self.kind} needs {shows} and no {'grid' if self.grid else other}")
-        if not self.x:
-            raise ValueError(f"a {self.kind} needs x")
-        if upwards != bool(self.y):
-            raise ValueError(f"a {self.kind} {'needs' if upwards else 'has no'} y")
-        if upwards and self.lines:
-            raise ValueError(f"a {self.kind} has no lines; use panels")
+        what, a_figure = self.what, f"a{'n' * (self.kind[0] in 'aeiou')} {self.kind}"
+        missing = [key for key in what.needs if not getattr(self, key)]
+        extra = self.model_fields_set - {"name", "title", "kind", *what.needs, *what.takes}
+        if missing or extra:
+            raise ValueError(f"{a_figure} {f'needs {missing[0]}' if missing else f'has no {min(extra)}'}")
+        if "panels" in self.model_fields_set and bool(self.panel_axis) != what.over_axes:
+            panels = "those of one axis" if what.over_axes else "listed"
+            raise ValueError(f"panels: of {a_figure} are {panels}")
         if len(set(self.axes.values())) < len(self.axes):
             raise ValueError("x, y, lines and panels must be different axes")
-        if self.mark is not None and shows == "limit":
-            raise ValueError(f"a {self.kind} has no mark")
         return self
-
-
-def _list_of_runs(value: object) -> Any:
-    if isinstance(value, int):  # former syntax of Latin hypercubes
-        raise ValueError(f"is a list of runs; a latin_hypercube has points: {value}")
-    return value
 
 
 class ExperimentSpec(OverrideSpec):
@@ -369,9 +359,7 @@ class ExperimentSpec(OverrideSpec):
         "", description="The paper, with all that is needed to find it, or whose question it is"
     )
     scenario: str = Field("", description="Scenario of the only run, relative to this file")
-    runs: Annotated[list[RunSpec], BeforeValidator(_list_of_runs)] = Field(
-        [], description="In place of a scenario"
-    )
+    runs: list[RunSpec] = Field([], description="In place of a scenario")
     axes: dict[str, DesignAxisSpec] = Field({}, description="Name -> what varies")
     design: Literal["grid", "list", "latin_hypercube"] = Field("grid", description="Which points of the axes")
     points: int | None = Field(None, ge=1, description="Of a Latin hypercube")
