@@ -13,6 +13,7 @@ import pyarrow.parquet as pq
 import pytest
 from lxml import html
 
+from tests.pages.made_up import unpacked
 from tests.refusals import each_mentions, mentions, refused, texts_of
 from yawbench.foundation.errors import Diagnostic, ScenarioError
 from yawbench.metrics.expressions import MetricValue
@@ -101,7 +102,7 @@ def problems(study, *changes):
 def page(findings, out) -> str:
     """Return what a reader of the experiment's page sees."""
     view = chapter(findings, command="yawbench study", stale={}, folder=out)
-    text = render(view)
+    text = unpacked(render(view))
     return " ".join(" ".join(html.fromstring(text).itertext()).split())
 
 

@@ -79,7 +79,7 @@ def unpacked(page: Path | str) -> str:
 
     def filled(place: re.Match[str]) -> str:
         text = gzip.decompress(base64.b64decode(place["text"])).decode()
-        return f' src="data:image/svg+xml,{quote(text)}"' if place["image"] else f">{text}"
+        return f">{text}" if place["image"] is None else f' src="data:image/svg+xml,{quote(text)}"'
 
     return re.sub(r'((?P<image>(?<=<img))|) data-packed="(?P<text>[^"]*)"(?(image)|>)', filled, html)
 

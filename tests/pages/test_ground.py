@@ -13,7 +13,7 @@ from yawbench.reports.viewer import viewer
 from yawbench.vocabulary.friction_table import table_of
 from yawbench.vocabulary.patches import friction_at, inside_polygon, patches_of
 
-from .made_up import data_in, whole_car
+from .made_up import data_in, unpacked, whole_car
 
 TEXTS = (
     "y > 0",
@@ -67,10 +67,10 @@ def test_there_is_no_ground_without_patches_or_of_too_many_pieces():
 def test_a_viewer_carries_the_ground_once_and_says_what_its_colours_mean():
     road = {"name": "road_a", "parameters": {"patches": "y > 0", "base_friction": 0.8}, "constants": {},
             "defaults": {"patch_friction": 0.2}}  # fmt: skip
-    assert "slippery" not in viewer([LabelledRun("a", whole_car())])
+    assert "slippery" not in unpacked(viewer([LabelledRun("a", whole_car())]))
     on_road = noted(whole_car(), fmus={"road": road})
     html = viewer([LabelledRun("a", on_road), LabelledRun("b", on_road)])
     data = data_in(html)
     assert [[friction for friction, _ in ground] for ground in data["grounds"]] == [[0.8, 0.2]]
     assert [one["road"]["ground"] for one in data["runs"]] == [0, 0]
-    assert mentions(html, "ground", "0.2", "0.8")
+    assert mentions(data["key"], "ground", "0.2", "0.8")

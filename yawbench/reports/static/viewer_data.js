@@ -19,9 +19,9 @@ const NOT_FINITE = [NaN, -Infinity, Infinity];
 
 function decoded([offset, base, step], rows, bytes) {
   const values = new Float64Array(rows);
+  const [low, middle, high, highest] = [0, 1, 2, 3].map((k) => bytes.subarray(offset + k * rows, offset + (k + 1) * rows));
   for (let i = 0, code = 0, slope = 0; i < rows; i++) {
-    let folded = 0;
-    for (let k = 0; k < 4; k++) folded |= bytes[offset + k * rows + i] << (8 * k);
+    const folded = low[i] | (middle[i] << 8) | (high[i] << 16) | (highest[i] << 24);
     slope = (slope + ((folded >>> 1) ^ -(folded & 1))) | 0;
     code = (code + slope) | 0;
     values[i] = code < 0 ? NOT_FINITE[-1 - code] : base + code * step;
