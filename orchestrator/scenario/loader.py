@@ -67,6 +67,8 @@ def load_scenario(
     if isinstance(document.data, dict):
         _check_time_grid(document)
         _check_instance_names(document)
+    if file is not None and vehicle is not None:
+        file, vehicle, effective = overrides.with_values(file, vehicle, effective)
     tyres = _read_tyres(file, vehicle, document, vehicle_document)
     errors = document.sorted_errors() + vehicle_document.sorted_errors()
     if errors or file is None or vehicle is None:

@@ -1,4 +1,4 @@
-"""Overrides: values that replace those of a scenario before it is validated.
+"""Overrides: values that replace those of a scenario.
 
     --swap INSTANCE=FMU                  the FMU of an instance
     --set INSTANCE.PARAMETER=VALUE       a parameter of an instance
@@ -35,6 +35,7 @@ from ..plan import Override, OverrideOrigin
 from ..signal_names import FACTS, FAULTS, INPUTS, OF_RUN, TYRES, VEHICLE, Target
 from . import yaml_lines
 from .fault_schema import location_of, parse_faults, read_line
+from .schema import ScenarioSpec, Vehicle, at, key_of, plain_value, put
 from .yaml_lines import Document, KeyPath
 
 
@@ -169,12 +170,13 @@ def swap_of(instance: str, text: str, origin: OverrideOrigin) -> list[Override]:
 def apply_changes(
     document: Document, vehicle: Document, changes: Iterable[Override]
 ) -> tuple[dict[str, str], tuple[Override, ...]]:
-    """Apply overrides to a scenario and its vehicle file; report those that do not apply.
+    """Apply overrides of what a scenario consists of: FMUs, files, times, faults; report what cannot be.
 
-    Of several overrides of a target, the last one wins.
+    Overrides of values are only checked: `with_values` applies them to the validated scenario. Of several
+    overrides of a target, the last one wins.
 
     Returns:
-        swapped instance -> its FMU in the file; the overrides that make a difference.
+        swapped instance -> its FMU in the file; the overrides that make a difference, and those of values.
     """
     replaced: dict[str, str] = {}
     effective: list[Override] = []
@@ -182,7 +184,7 @@ def apply_changes(
     for change in {change.target: change for change in changes}.values():
         kind, holder, name = change.target.kind, change.target.instance, change.target.variable
         spec = instances.get(holder)
-        if kind in ("run", "fact"):
+        if kind == "run":
             differs = _put(document, (name,), change)
         elif kind == "vehicle_file":
             differs = True  # see `apply_vehicle`
@@ -190,10 +192,8 @@ def apply_changes(
             differs = _put_tyres(document, vehicle, change)
         elif kind == "faults":
             differs = _put_faults(document, change, name)
-        elif kind == "vehicle_parameter":
-            differs = _put(vehicle, ("parameters", name), change)
-        elif kind == "input":
-            differs = _put(document, (INPUTS, name), change)
+        elif kind in ("fact", "vehicle_parameter", "input"):
+            differs = _is_value(document, change)
         elif not isinstance(spec, dict):
             known = (*instances, VEHICLE, INPUTS) if name else instances
             sentence = f"the scenario has no instance {holder!r}{hint(holder, known, lead='it has')}"
@@ -206,9 +206,37 @@ def apply_changes(
         elif kind == "setting":
             differs = _put(document, ("units", holder, name), change)
         else:
-            differs = _put(document, ("units", holder, "parameters", name), change)
+            differs = _is_value(document, change)
         effective += [change] if differs else []
     return replaced, tuple(effective)
+
+
+def _is_value(document: Document, change: Override) -> bool:
+    """Return True; report a value that nothing can take."""
+    try:
+        plain_value(change.value)
+    except ValueError as error:
+        document.add(Diagnostic("value-invalid", str(error), location=Location(target=str(change))))
+    return True
+
+
+def with_values(
+    scenario: ScenarioSpec, vehicle: Vehicle, changes: Iterable[Override]
+) -> tuple[ScenarioSpec, Vehicle, tuple[Override, ...]]:
+    """Return a scenario and its vehicle with the values that overrides give, and those that differ."""
+    effective: list[Override] = []
+    for change in changes:
+        key = key_of(change.target)
+        of_vehicle = change.target.kind == "vehicle_parameter"
+        before = at(vehicle if of_vehicle else scenario, key)
+        given = change.given(before)
+        if not key or before is None or _differ(before.value, given.value):
+            effective.append(change)
+        if key and of_vehicle:
+            vehicle = put(vehicle, key, given)
+        elif key:
+            scenario = put(scenario, key, given)
+    return scenario, vehicle, tuple(effective)
 
 
 def apply_vehicle(document: Document, changes: Iterable[Override]) -> None:
@@ -299,8 +327,11 @@ def _put(document: Document, key: KeyPath, change: Override, value: Any = None) 
     if isinstance(document.data, dict):
         holder[key[-1]] = value
         document.overrides[key] = change
-        document.before.setdefault(key, before)
-    return before != value or isinstance(before, bool) != isinstance(value, bool)
+    return _differ(before, value)
+
+
+def _differ(before: Any, after: Any) -> bool:
+    return before != after or isinstance(before, bool) != isinstance(after, bool)
 
 
 def _mapping(data: Any, name: str) -> dict[str, Any]:

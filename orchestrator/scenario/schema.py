@@ -19,9 +19,12 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from fractions import Fraction
+from functools import lru_cache
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
 
 from pydantic import (
     AfterValidator,
@@ -34,18 +37,23 @@ from pydantic import (
     WithJsonSchema,
     model_validator,
 )
+from pydantic_core.core_schema import no_info_after_validator_function
 
 from yawbench.fmus.fmu import Value
 from yawbench.foundation.messages import listed, short
 from yawbench.vocabulary.vehicle import CAR
 
 from ..coupling_algorithms import ALGORITHMS
-from ..plan import Override
-from ..signal_names import RESERVED, SignalName
+from ..plan import Given, OriginKind, Override, ValueOrigin, ValueSource
+from ..signal_names import FACTS, INPUTS, RESERVED, SignalName, Target, TargetKind
 from .fault_schema import FaultSpec
+from .quantities import parse_unit
 from .schema_validation import Instant, OneOf, StrictModel, Time, in_unit
 from .tir import TyreFile
 from .yaml_lines import Document, KeyPath
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
 
 AXLES = ("front", "rear")
 
@@ -73,7 +81,12 @@ def _unit_name(name: str) -> str:
     return name
 
 
-def _plain(value: object) -> Value:
+def plain_value(value: object) -> Value:
+    """Return a value for a parameter or an input, unconverted.
+
+    Raises:
+        ValueError: it is neither a finite number nor true or false nor text.
+    """
     if isinstance(value, float) and not math.isfinite(value):
         raise ValueError(f"must be a finite number (got {value!r})")
     if isinstance(value, (bool, int, float, str)):
@@ -122,7 +135,9 @@ _OF_AXLES = {
     "additionalProperties": False,
 }
 
-Scalar = Annotated[Value, PlainValidator(_plain), WithJsonSchema({"type": ["number", "string", "boolean"]})]
+Scalar = Annotated[
+    Value, PlainValidator(plain_value), WithJsonSchema({"type": ["number", "string", "boolean"]})
+]
 Tolerance = Annotated[
     float,
     PlainValidator(_tolerance),
@@ -143,6 +158,30 @@ InstanceName = Annotated[
 ]
 
 
+class _AsGiven:
+    """Validates `Given[T]` as T; `placed` adds its origin and place, which only the document knows."""
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
+        return no_info_after_validator_function(Given, handler.generate_schema(get_args(source)[0]))
+
+
+@lru_cache(maxsize=10_000)
+def _origin(kind: OriginKind, comment: str, of_file: str, path: str, line: int) -> ValueOrigin:
+    source = ValueSource.of_comment(comment, of_file)
+    return ValueOrigin(kind, source=replace(source, file=path, line=line))
+
+
+@lru_cache(maxsize=10_000)
+def _without_unit(comment: str) -> str:
+    """Return a comment in a vehicle file without the unit that it may begin with."""
+    begin = re.match(r"([^\s,;]+)[,;]?\s*", comment)
+    try:
+        parse_unit(begin[1] if begin else "")
+    except ValueError:
+        return comment
+    return comment[begin.end() :] if begin else comment
+
+
 class TextSpec(StrictModel):
     """The text of a file (UTF-8) as the value of a text parameter, such as the patches of a road."""
 
@@ -156,6 +195,7 @@ def _form(value: object) -> str:
 ParameterValue = Annotated[
     Annotated[Scalar, Tag("value")] | Annotated[TextSpec, Tag("of file")], Discriminator(_form)
 ]
+GivenParameter = Annotated[Given[ParameterValue], _AsGiven()]
 
 
 class InstanceSpec(StrictModel):
@@ -163,7 +203,7 @@ class InstanceSpec(StrictModel):
 
     fmu: str = Field(description="Name of an FMU in fmus/, or the path of any .fmu", min_length=1)
     step_size: Time | None = Field(None, description="s, an integer multiple of the communication step")
-    parameters: dict[str, ParameterValue] = Field({}, description="Values of the instance's parameters")
+    parameters: dict[str, GivenParameter] = Field({}, description="Values of the instance's parameters")
     tolerance: Tolerance | None = Field(
         None,
         description="Relative tolerance of the FMU's own solver; default: that of its default experiment",
@@ -202,6 +242,7 @@ class SeriesSpec(StrictModel):
 InputValue = Annotated[
     Annotated[Scalar, Tag("value")] | Annotated[SeriesSpec, Tag("of file")], Discriminator(_form)
 ]
+GivenInput = Annotated[Given[InputValue], _AsGiven()]
 
 
 class Connection(StrictModel):
@@ -256,8 +297,9 @@ class Connection(StrictModel):
         return (1.0 if self.gain is None else self.gain, 0.0 if self.offset is None else self.offset)
 
 
-Friction = Annotated[Scalar, WithJsonSchema(in_unit("1"))]
-Speed = Annotated[Scalar, WithJsonSchema(in_unit("m/s"))]
+Friction = Annotated[Given[Scalar], _AsGiven(), WithJsonSchema(in_unit("1"))]
+Speed = Annotated[Given[Scalar], _AsGiven(), WithJsonSchema(in_unit("m/s"))]
+GivenScalar = Annotated[Given[Scalar], _AsGiven()]
 
 
 def _of_car() -> dict[str, Any]:
@@ -275,9 +317,24 @@ class Vehicle(StrictModel):
     tyres: Tyres | None = Field(
         None, description="Tyre property file (.tir), or front: and rear: of one each, relative to this file"
     )
-    parameters: Annotated[dict[str, Scalar], WithJsonSchema(_of_car())] = Field(
+    parameters: Annotated[dict[str, GivenScalar], WithJsonSchema(_of_car())] = Field(
         {}, description="Parameter name -> value"
     )
+
+    def placed(self, document: Document) -> Self:
+        """Return the vehicle with the origins and places of its values."""
+        placed = {}
+        for name, given in self.parameters.items():
+            key = ("parameters", name)
+            comment, line = _without_unit(document.comment(key)), document.lines.get(key, 0)
+            origin = _origin("vehicle", comment, self.source, str(document.path), line)
+            placed[name] = replace(given, origin=origin, where=document.location(key))
+        return self.model_copy(update={"parameters": placed})
+
+    @property
+    def values(self) -> dict[str, Value]:
+        """The parameters as written."""
+        return {name: given.value for name, given in self.parameters.items()}
 
 
 class ScenarioSpec(StrictModel):
@@ -304,7 +361,7 @@ class ScenarioSpec(StrictModel):
     )
     friction: Friction | None = Field(None, description="Friction of the road, for all instances that use it")
     speed: Speed | None = Field(None, description="m/s, initial speed, and target of the driver")
-    inputs: dict[str, InputValue] = Field({}, description="[instance.]pattern -> constant or time series")
+    inputs: dict[str, GivenInput] = Field({}, description="[instance.]pattern -> constant or time series")
     units: dict[InstanceName, InstanceSpec] = Field(description="Name -> instance", min_length=1)
     connections: list[Connection] = Field([], description="Connections beyond equal names")
     record: list[Variables] | None = Field(
@@ -312,6 +369,62 @@ class ScenarioSpec(StrictModel):
     )
 
     faults: list[FaultSpec] = Field([], description="Disturbances of signals")
+
+    def placed(self, document: Document) -> Self:
+        """Return the scenario with the origins and places of its values.
+
+        The source of a value is in the comment on it, else in that above its instance, else that of the file.
+        """
+
+        def at(given: Given[Any], *key: str) -> Given[Any]:
+            of_instance = document.comment_above(key[:2]) if key[0] == "units" else ""
+            comment, line = document.comment(key) or of_instance or self.source, document.lines.get(key, 0)
+            origin = _origin("scenario", comment, self.source, str(document.path), line)
+            return replace(given, origin=origin, where=document.location(key))
+
+        def all_at(values: Mapping[str, Given[Any]], *key: str) -> dict[str, Given[Any]]:
+            return {name: at(given, *key, name) for name, given in values.items()}
+
+        facts = {name: at(given, name) for name in FACTS if (given := getattr(self, name)) is not None}
+        units = {
+            name: unit.model_copy(update={"parameters": all_at(unit.parameters, "units", name, "parameters")})
+            for name, unit in self.units.items()
+        }
+        return self.model_copy(update={**facts, "units": units, "inputs": all_at(self.inputs, INPUTS)})
+
+
+PARAMETERS = "parameters"
+
+
+def key_of(target: Target) -> tuple[str, ...]:
+    """Return the key of the value that a target addresses, in a scenario or in its vehicle file.
+
+    Returns:
+        () if it addresses something else: an FMU, a file, times, faults.
+    """
+    keys: dict[TargetKind, tuple[str, ...]] = {
+        "fact": (target.variable,),
+        "input": (INPUTS, target.variable),
+        "parameter": ("units", target.instance, PARAMETERS, target.variable),
+        "vehicle_parameter": (PARAMETERS, target.variable),
+    }
+    return keys.get(target.kind, ())
+
+
+def at(holder: Any, key: Sequence[str | int]) -> Any:
+    """Return the value at a key of nested mappings and models, None if there is none."""
+    for part in key:
+        holder = holder.get(part) if isinstance(holder, dict) else getattr(holder, str(part), None)
+    return holder
+
+
+def put(holder: Any, key: Sequence[str | int], value: Any) -> Any:
+    """Return nested mappings and models with another value at a key; what holds it is copied."""
+    part, *rest = key
+    inner = put(at(holder, [part]), rest, value) if rest else value
+    if isinstance(holder, StrictModel):
+        return holder.model_copy(update={str(part): inner})
+    return {**(holder or {}), part: inner}
 
 
 class LoadedScenario(ScenarioSpec):
@@ -348,13 +461,16 @@ class LoadedScenario(ScenarioSpec):
     def as_run(self) -> dict[str, Any]:
         """Return the scenario with vehicle file and overrides applied, as JSON-ready data."""
         data = dict(self.document.data)
+        for change in self.changes:
+            if (key := key_of(change.target)) and key[0] != PARAMETERS:
+                data = put(data, key, change.value)
         times = {"stop_time": float(self.stop_time), "step_size": float(self.step_size)}
         if self.start_time:
             times["start_time"] = float(self.start_time)
         tyres = {axle: file.record() for axle, file in self.tyre_files.items()}
         vehicle = {"vehicle_title": self.vehicle_file.title, "vehicle_source": self.vehicle_file.source}
         return {
-            **{"file": str(self.path), **data, **times, "vehicle_parameters": self.vehicle_file.parameters},
+            **{"file": str(self.path), **data, **times, "vehicle_parameters": self.vehicle_file.values},
             **(vehicle if self.vehicle else {}),
             **({"tyre_files": tyres} if tyres else {}),
         }

@@ -44,8 +44,6 @@ class Document:
     lines: dict[KeyPath, int] = field(default_factory=dict)
     overrides: dict[KeyPath, Override] = field(default_factory=dict)
     """Key of an overridden value -> its override."""
-    before: dict[KeyPath, Any] = field(default_factory=dict)
-    """Key of an overridden value -> that of the file; None: it has none."""
     errors: dict[Diagnostic, None] = field(default_factory=dict)
     """An ordered set."""
     comments: dict[int, str] = field(default_factory=dict)
@@ -60,8 +58,8 @@ class Document:
     def fresh(self) -> Document:
         """Return a document with the same content, and overrides, errors and notes of its own."""
         return replace(
-            self, lines={**self.lines}, overrides={**self.overrides}, before={**self.before},
-            errors={**self.errors}, notes=[*self.notes],
+            self, lines={**self.lines}, overrides={**self.overrides}, errors={**self.errors},
+            notes=[*self.notes],
         )  # fmt: skip
 
     def to_change(self, key: KeyPath) -> dict[str | int, Any]:

@@ -17,15 +17,16 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 from yawbench.fmus.fmu import Fmu, Value, Variable
-from yawbench.foundation.errors import Diagnostic, Severity, WiringError
+from yawbench.foundation.errors import Diagnostic, Location, Severity, WiringError
 from yawbench.foundation.messages import fold_sentences
 from yawbench.vocabulary.wheels import WHEELS, wheels
 
-from ..plan import DEFAULT, Instance, Plan, ValueOrigin
+from ..plan import Given, Instance, Plan
 from ..scenario.loader import LoadedScenario
-from ..scenario.yaml_lines import MOST_ERRORS, Document, KeyPath
+from ..scenario.yaml_lines import MOST_ERRORS, KeyPath
 from ..signal_names import FACTS as NAMES
 from ..signal_names import OF_RUN, SignalName, Target, match, matching
 
@@ -53,12 +54,12 @@ FACTS = {
 assert tuple(FACTS) == NAMES
 
 
-def facts_of(scenario: LoadedScenario) -> Iterator[tuple[str, Fact, Value, bool]]:
-    """Yield the facts of a scenario: name, fact, value, and whether the value is an override."""
+def facts_of(scenario: LoadedScenario) -> Iterator[tuple[str, Fact, Given[Value]]]:
+    """Yield the facts of a scenario: name, fact, value."""
     for name, fact in FACTS.items():
-        value = getattr(scenario, name)
-        if value is not None:
-            yield name, fact, value, scenario.document.override((name,)) is not None
+        given = getattr(scenario, name)
+        if given is not None:
+            yield name, fact, given
 
 
 ByUnit = dict[str, dict[str, Variable]]
@@ -79,13 +80,16 @@ class WiringContext:
     """Returns the replaced FMU of an instance, None if it does not exist."""
     notes: list[Diagnostic] = field(default_factory=list)
     """Diagnostics that are not errors, for the plan."""
-    reported: list[tuple[tuple[bool, KeyPath, str], str]] = field(default_factory=list)
-    """Errors: whether the key is in the vehicle file, the key, the code; the sentence."""
+    reported: list[tuple[tuple[Location, str], str]] = field(default_factory=list)
+    """Errors: place and code, sentence."""
 
     @cached_property
-    def origins(self) -> dict[str, dict[str, ValueOrigin]]:
-        """Instance -> parameter or constant -> where its value comes from, as far as known yet."""
-        return {instance: {} for instance in self.fmus}
+    def given(self) -> dict[str, dict[str, Given[Any]]]:
+        """Instance -> parameter or constant -> its value as given, at first the start value of the FMU."""
+        return {
+            instance: {variable.name: Given(variable.start) for variable in fmu.of("parameter")}
+            for instance, fmu in self.fmus.items()
+        }
 
     @cached_property
     def inputs(self) -> ByUnit:
@@ -134,30 +138,22 @@ class WiringContext:
         """Add a diagnostic that is not an error."""
         self.notes.append(Diagnostic(code, sentence, severity))
 
-    def report(
-        self, key: KeyPath, sentence: str, code: str = "value-invalid", document: Document | None = None
-    ) -> None:
-        """Report an error about the value at `key` of the scenario, or of the vehicle file if given.
+    def report(self, where: KeyPath | Location, sentence: str, code: str = "value-invalid") -> None:
+        """Report an error about a value: at a key of the scenario, or at a place.
 
         Raises:
             WiringError: there are too many errors to continue.
         """
-        self.reported.append(((document is self.scenario.vehicle_document, key, code), sentence))
+        where = where if isinstance(where, Location) else self.scenario.document.location(where)
+        self.reported.append(((where, code), sentence))
         if len(self.reported) >= len(WHEELS) * MOST_ERRORS:
             raise WiringError(self.errors())
 
     def errors(self) -> list[Diagnostic]:
         """Return all errors in the order of the files' lines, with those of the four wheels merged."""
-        errors: list[Diagnostic] = []
-        folded = fold_sentences(self.reported)
-        for of_vehicle, document in enumerate((self.scenario.document, self.scenario.vehicle_document)):
-            of_document = [
-                Diagnostic(code, text, location=document.location(key))
-                for (which, key, code), text in folded
-                if which == of_vehicle
-            ]
-            errors += sorted(dict.fromkeys(of_document), key=lambda error: error.location.line or 0)
-        return errors
+        errors = [Diagnostic(code, text, location=at) for (at, code), text in fold_sentences(self.reported)]
+        vehicle = self.scenario.vehicle_document.path
+        return sorted(dict.fromkeys(errors), key=lambda e: (e.location.file == vehicle, e.location.line or 0))
 
 
 def reached(plan: Plan, target: Target) -> Iterator[tuple[Instance, Variable]]:
@@ -200,7 +196,7 @@ def found_at(plan: Plan, target: Target) -> tuple[Value, str] | None:
         return float(instance.period * plan.step), "s"
     for instance, variable in reached(plan, target):
         value = {**instance.parameters, **instance.constants}.get(variable.name, variable.start)
-        of_vehicle = instance.origins.get(variable.name, DEFAULT).kind == "vehicle"
+        of_vehicle = instance.origin(variable.name).kind == "vehicle"
         if value is not None and (of_vehicle or target.kind != "vehicle_parameter"):
             return value, variable.unit or ""
     return None

@@ -43,7 +43,7 @@ from yawbench.foundation.messages import closest, fold, hint, listed
 from yawbench.vocabulary.roles import role_in, role_of
 from yawbench.vocabulary.wheels import WHEELS
 
-from ..plan import DEFAULT, InputSeries, Instance, Plan, ValueOrigin, Wire
+from ..plan import Given, InputSeries, Instance, Plan, ValueOrigin, Wire
 from ..scenario.loader import LoadedScenario
 from ..signal_names import SignalName, match
 from .connections import Connector
@@ -198,12 +198,12 @@ def _values(
     for (instance, name), constant in by_input.items():
         if (instance, name) not in wired:
             values[instance][name] = constant.value
-            system.origins[instance][name] = constant.origin
+            system.given[instance][name] = constant.given
     for instance, name in network.kept:
         start = system.inputs[instance][name].start
         assert start is not None  # else it would have been reported
         values[instance][name] = start
-        system.origins[instance][name] = DEFAULT
+        system.given[instance][name] = Given(start)
     return values
 
 
@@ -320,14 +320,17 @@ def _take_from_tyres(
         ]
     stiffness = dict(zip(STIFFNESSES, (2.0 * measured[wheel] for wheel in WHEELS[::2]), strict=True))
     for instance, names in distributed.lacking.items():
-        formula = {
-            name: ValueOrigin.derived(f"two of {tyres[0].fmu.name} at {load:.6g} N each")
+        given = {
+            name: Given(
+                stiffness[name], ValueOrigin.derived(f"two of {tyres[0].fmu.name} at {load:.6g} N each")
+            )
             for name, load in zip(STIFFNESSES, loads, strict=True)
+            if name in names
         }
         instances[instance] = replace(
             instances[instance],
             parameters=instances[instance].parameters | {name: stiffness[name] for name in names},
-            origins=instances[instance].origins | {name: formula[name] for name in names},
+            given=instances[instance].given | given,
         )
     return []
 
@@ -347,7 +350,7 @@ def _instance(
         period=int((spec.step_size or step) / step),
         parameters=parameters,
         constants={key: v.first(start) if isinstance(v, InputSeries) else v for key, v in inputs.items()},
-        origins=system.origins[name],
+        given=system.given[name],
         tolerance=spec.tolerance,
         series={key: v for key, v in inputs.items() if isinstance(v, InputSeries)},
     )

@@ -91,9 +91,9 @@ class _Given(NamedTuple):
 
 def suspicious_car(scenario: LoadedScenario, instances: Mapping[str, Instance]) -> list[Diagnostic]:
     """Return a warning for every implausible quantity of the car, and for inertias that do not fit."""
-    of_file = suspicious_vehicle(scenario.vehicle_file.parameters)
-    in_file = {(item.name, item.value) for item in _of_file(scenario.vehicle_file.parameters)}
-    own = [item for item in _of_instances(scenario, instances) if (item.name, item.value) not in in_file]
+    of_file = suspicious_vehicle(scenario.vehicle_file.values)
+    in_file = {(item.name, item.value) for item in _of_file(scenario.vehicle_file.values)}
+    own = [item for item in _of_instances(instances) if (item.name, item.value) not in in_file]
     return [*of_file, *filter(None, map(_beyond, own)), *_index(instances)]
 
 
@@ -115,14 +115,14 @@ def _quantity(name: str, raw: Value) -> _Given | None:
         return None
 
 
-def _of_instances(scenario: LoadedScenario, instances: Mapping[str, Instance]) -> Iterator[_Given]:
+def _of_instances(instances: Mapping[str, Instance]) -> Iterator[_Given]:
     """Yield the quantities that the scenario or an override gives to single instances."""
     for instance in instances.values():
         for name, value in instance.parameters.items():
-            origin = instance.origins.get(name, DEFAULT).kind
+            origin = instance.origin(name).kind
             as_said = instance.fmu.variables[name].unit == CAR[name].unit if name in CAR else False
             if as_said and origin not in ("default", "vehicle", "derived") and isinstance(value, float):
-                raw = scenario.units[instance.name].parameters.get(name, value)
+                raw = instance.given[name].value
                 yield _Given(f"{instance.name}.{name}", name, value, raw)
 
 
@@ -155,7 +155,7 @@ def _index(instances: Mapping[str, Instance]) -> Iterator[Diagnostic]:
     for instance in instances.values():
         values = {name: instance.parameter(name) for name in INERTIA if name in instance.fmu.variables}
         numbers = [value for value in values.values() if isinstance(value, float)]
-        is_set = any(instance.origins.get(name, DEFAULT) != DEFAULT for name in INERTIA)
+        is_set = any(instance.origin(name) != DEFAULT for name in INERTIA)
         if not is_set or len(numbers) < len(INERTIA):
             continue
         items = (_Given("", name, number, number) for name, number in zip(INERTIA, numbers, strict=True))
@@ -199,6 +199,7 @@ class GivenValue(NamedTuple):
     value: Value
     origin: OriginKind
     variable: Variable
+    unit: str = ""  # that the value names
 
 
 def suspicious_values(scenario: LoadedScenario, instances: Mapping[str, Instance]) -> list[Diagnostic]:
@@ -341,17 +342,16 @@ def _differ(items: list[GivenValue], *, start: bool = False) -> bool:
 def _parameters(instances: Iterable[Instance]) -> Iterator[GivenValue]:
     for instance in instances:
         for variable in instance.fmu.of("parameter"):
-            value = instance.parameter(variable.name)
-            origin = instance.origins.get(variable.name, DEFAULT).kind
-            if value is not None and (value != 0 or origin != DEFAULT.kind):  # 0 by default: not given
-                yield GivenValue(instance.name, variable.name, value, origin, variable)
+            value, given = instance.parameter(variable.name), instance.given[variable.name]
+            if value is not None and (value != 0 or given.origin != DEFAULT):  # 0 by default: not given
+                yield GivenValue(instance.name, variable.name, value, given.origin.kind, variable, given.unit)
 
 
 def _constants(instances: Iterable[Instance]) -> Iterator[GivenValue]:
     for instance in instances:
         for name, value in instance.constants.items():
             if name not in instance.series:
-                origin = instance.origins.get(name, DEFAULT).kind
+                origin = instance.origin(name).kind
                 yield GivenValue(instance.name, name, value, origin, instance.fmu.variables[name])
 
 
@@ -397,10 +397,7 @@ def _slips(
     for item in parameters:
         if item.origin == "default" or not isinstance(item.value, float) or abs(item.value) <= LEAST_SLIP:
             continue
-        spec = scenario.units[item.instance].parameters.get(item.name)
-        raw = scenario.vehicle_file.parameters.get(item.name) if spec is None else spec
-        facts = [getattr(scenario, name) for name, fact in FACTS.items() if item.name in fact.parameters]
-        if any(isinstance(number, str) for number in (raw, *facts)):  # they name their unit
+        if item.unit:  # as it was meant
             continue
         for unit, largest, meant, factor in SLIPS:
             if item.variable.unit == unit and abs(item.value) > largest:

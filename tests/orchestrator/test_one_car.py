@@ -154,7 +154,7 @@ def unit(plan, name):
 def test_a_unit_takes_what_it_declares_and_what_follows(plan):
     plant = unit(plan(), "plant")
     assert plant.parameters == {"mass": 1830.0, "cg_to_rear_axle": pytest.approx(1.65)}
-    assert {name: str(origin) for name, origin in plant.origins.items()} == {
+    assert {name: str(given.origin) for name, given in plant.given.items()} == {
         "mass": "derived: sprung_mass + unsprung_mass",
         "cg_to_rear_axle": "derived: wheelbase - cg_to_front_axle",
     }
@@ -218,7 +218,7 @@ def test_a_reference_is_told_what_the_tyres_have_at_their_static_loads(plan):
     load = 0.5 * 1830.0 * G * 1.65 / 3.05
     assert asked == {"fl": pytest.approx(load), "rl": pytest.approx(0.5 * 1830.0 * G - load)}
     formula = f"two of tyre_x at {load:.6g} N each"
-    assert reference.origins["cornering_stiffness_front"] == ValueOrigin("derived", formula)
+    assert reference.origin("cornering_stiffness_front") == ValueOrigin("derived", formula)
 
 
 def test_a_reference_without_tyres_to_ask_is_refused(plan):

@@ -86,11 +86,8 @@ def test_every_unit_takes_what_it_declares_for_both_axles(folder, fmus):
     assert (control["pkx1_front"], control["pkx1_rear"]) == (18.0, 25.0)
     assert "pky1_front" not in control
     assert not set(parameters(planned, "plant")) & set(tyre)
-    origins = {u.name: u.origins for u in planned.instances}
-    assert (str(origins["tyre"]["pky1_front"]), str(origins["tyre"]["pky1_rear"])) == (
-        "soft.tir",
-        "stiff.tir",
-    )
+    tyres = next(u for u in planned.instances if u.name == "tyre")
+    assert [str(tyres.origin(name)) for name in ("pky1_front", "pky1_rear")] == ["soft.tir", "stiff.tir"]
     assert not any("tyre" in note or "radius" in note for note in texts_of(planned))
 
 

@@ -100,7 +100,7 @@ def knobs_of(scenario: LoadedScenario, plan: Plan) -> list[Knob]:
             own = variable.name in scenario.units[instance.name].parameters
             target = f"{instance.name}.{variable.name}"
             if variable.name in CAR and of_file is not None and not own:
-                target, value = f"vehicle.{variable.name}", float(value_for(variable, of_file))
+                target, value = f"vehicle.{variable.name}", float(value_for(variable, of_file.value))
             if any(
                 knob.target in FACTS and variable.name in FACTS[knob.target].parameters
                 for knob in knobs.values()
@@ -111,9 +111,9 @@ def knobs_of(scenario: LoadedScenario, plan: Plan) -> list[Knob]:
 
 
 def _facts(scenario: LoadedScenario, plan: Plan) -> Iterator[Knob]:
-    for name, fact, raw, _ in facts_of(scenario):
+    for name, fact, given in facts_of(scenario):
         if any(True for _ in reached(plan, Target("fact", variable=name))):
-            value = float(convert(raw, fact.unit) if isinstance(raw, str) else raw)
+            value = float(convert(given.value, fact.unit) if isinstance(given.value, str) else given.value)
             low, high = FACT_RANGES[name]
             unit = "" if fact.unit == "1" else fact.unit
             yield Knob(name, unit, value, min(low, value), max(high, value), f"{name} for all instances")
@@ -141,8 +141,8 @@ def shown_first(knobs: Sequence[Knob], plan: Plan) -> list[str]:
         f"{instance.name}.{name}"
         for instance in plan.instances
         if instance.role == "driver"
-        for name, origin in instance.origins.items()
-        if origin.kind == "scenario"
+        for name, given in instance.given.items()
+        if given.origin.kind == "scenario"
     }
     wanted = (
         *FACTS,

@@ -72,7 +72,7 @@ def vehicle(
     file = loader.find(file, "a vehicle file")
     document = yaml_lines.read(file, what="vehicle file")
     spec = validated(Vehicle, document)
-    for warning in suspicious_vehicle(spec.parameters):
+    for warning in suspicious_vehicle(spec.values):
         say(f"note: {warning}")
     planner = Planner(build=options.build)
     names = plant.split(",") if plant else [fitting_plant(file, tyre, options.fmus, planner)]

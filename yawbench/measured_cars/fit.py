@@ -322,8 +322,8 @@ class ScenarioModel:
         scenario = planner.load(fit.scenario)
         self._series = {
             key: spec
-            for key, spec in scenario.inputs.items()
-            if isinstance(spec, SeriesSpec)
+            for key, given in scenario.inputs.items()
+            if isinstance(spec := given.value, SeriesSpec)
             and (fit.scenario.parent / spec.file).resolve() == fit.measurement.path.resolve()
         }
         if not self._series:

@@ -424,8 +424,8 @@ def _value_of(target: Target, model: ScenarioModel) -> tuple[float | None, str |
     """
     name = target.variable
     if target.kind == "fact":
-        value = model.planner.load(model.fit.scenario).friction if name == "friction" else None
-        return (value if isinstance(value, float) else None), FACTS[name].unit, False
+        given = model.planner.load(model.fit.scenario).friction if name == "friction" else None
+        return (given.value if given and isinstance(given.value, float) else None), FACTS[name].unit, False
     having = [
         instance
         for instance in model.base.instances
