@@ -20,7 +20,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import lru_cache
 from pathlib import Path
@@ -40,6 +40,7 @@ from pydantic import (
 from pydantic_core.core_schema import no_info_after_validator_function
 
 from yawbench.fmus.fmu import Value
+from yawbench.foundation.errors import Diagnostic
 from yawbench.foundation.messages import listed, short
 from yawbench.vocabulary.vehicle import CAR
 
@@ -49,7 +50,6 @@ from ..signal_names import FACTS, INPUTS, RESERVED, SignalName, Target, TargetKi
 from .fault_schema import FaultSpec
 from .quantities import parse_unit
 from .schema_validation import Instant, OneOf, StrictModel, Time, in_unit
-from .tir import TyreFile
 from .yaml_lines import Document, KeyPath
 
 if TYPE_CHECKING:
@@ -393,6 +393,21 @@ class ScenarioSpec(StrictModel):
         return self.model_copy(update={**facts, "units": units, "inputs": all_at(self.inputs, INPUTS)})
 
 
+@dataclass(frozen=True)
+class PropertyFile:
+    """A file with the parameters of a part of a car, such as a tyre."""
+
+    path: Path
+    sha256: str
+    values: Mapping[str, float]
+    """Parameter name -> its value in SI units."""
+    warnings: tuple[Diagnostic, ...]
+
+    def record(self) -> dict[str, object]:
+        """Return its entry in the run record."""
+        return {"file": str(self.path), "sha256": self.sha256, "warnings": list(map(str, self.warnings))}
+
+
 PARAMETERS = "parameters"
 
 
@@ -436,7 +451,7 @@ class LoadedScenario(ScenarioSpec):
     vehicle_document: InstanceOf[Document]
     vehicle_file: Vehicle
     """Parameters for every instance that declares them; empty if there is no vehicle file."""
-    tyre_files: dict[str, InstanceOf[TyreFile]]
+    tyre_files: dict[str, InstanceOf[PropertyFile]]
     """Axle -> its tyre property file, for every instance that declares the parameters; may be empty."""
     replaced: dict[str, str]
     """Swapped instance -> its FMU in the file."""

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.cars import load_scenario, make_plan
 from tests.refusals import each_mentions, mentions, places_of, refused, texts_of
 from yawbench.cli import main
 from yawbench.commands.check import show
@@ -17,9 +18,7 @@ from yawbench.foundation import safe_files
 from yawbench.foundation.errors import Diagnostic, ScenarioError, YawbenchError
 from yawbench.foundation.safe_files import reading
 from yawbench.orchestrator.scenario import yaml_lines
-from yawbench.orchestrator.scenario.loader import load_scenario
 from yawbench.orchestrator.scenario.overrides import read_changes
-from yawbench.orchestrator.wiring.make_plan import make_plan
 from yawbench.reports.study_page import chapter, study_page
 from yawbench.studies.claim_schema import parse
 from yawbench.studies.experiment import LoadedExperiment

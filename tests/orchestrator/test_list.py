@@ -8,13 +8,13 @@ import pytest
 from tests.fmu_copies import put_fmus
 from tests.refusals import each_mentions, mentions
 from yawbench.metrics.expressions import columns_for, evaluate_all
-from yawbench.orchestrator.recordings.motion import LEAST_SPEED
 from yawbench.orchestrator.results.reader import found_runs, load_results
 from yawbench.orchestrator.results.run_folder import RunStatus
 from yawbench.orchestrator.results.run_record import FmuRecord, RunRecord
 from yawbench.orchestrator.scenario.loader import title_of
 from yawbench.reports.comparison import differences
 from yawbench.studies.tables import runs_table
+from yawbench.vocabulary.motion import LEAST_SPEED
 
 from .recorded import car, write
 

@@ -7,15 +7,14 @@ from pathlib import Path
 import pytest
 from ruamel.yaml import YAML
 
+from tests.cars import load_scenario, make_plan
 from tests.changed import changed
 from tests.refusals import each_mentions, mentions, refused, texts_of
 from yawbench.commands.check import show
 from yawbench.components.cars.sprung_car import FourteenDofParameters, ride_of
 from yawbench.foundation.errors import WiringError
 from yawbench.orchestrator.plan import ValueOrigin
-from yawbench.orchestrator.scenario.loader import load_scenario
-from yawbench.orchestrator.wiring.derivations import DERIVATIONS, adapted, car_of, contradictions
-from yawbench.orchestrator.wiring.make_plan import make_plan
+from yawbench.vehicles.derivations import DERIVATIONS, adapted, car_of, contradictions
 from yawbench.vocabulary.gravity import G
 
 from .fake_fmus import Var, make_fmu, out

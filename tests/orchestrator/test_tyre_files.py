@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.cars import load_scenario, make_plan
 from tests.changed import changed
 from tests.refusals import mentions, refused, texts_of
 from yawbench.cli import main
@@ -18,10 +19,8 @@ from yawbench.interop.ssp_write import write_ssp
 from yawbench.orchestrator.results.freshness import key_of, run_record
 from yawbench.orchestrator.results.reader import load_results
 from yawbench.orchestrator.results.run_folder import default_folder
-from yawbench.orchestrator.scenario.loader import load_scenario
 from yawbench.orchestrator.scenario.overrides import changes_of, read_changes
 from yawbench.orchestrator.signal_names import Target
-from yawbench.orchestrator.wiring.make_plan import make_plan
 from yawbench.reports.page_parts import groups_of
 from yawbench.studies.experiment import plan_experiment
 from yawbench.studies.load_experiment import load_experiment

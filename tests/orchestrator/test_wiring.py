@@ -10,13 +10,12 @@ from typing import Any
 
 import pytest
 
+from tests.cars import load_scenario, make_plan
 from tests.changed import changed
 from tests.refusals import each_mentions, mentions, places_of, texts_of
 from yawbench.fmus import opener
 from yawbench.foundation.errors import Diagnostic, Location, ModelDescriptionError, WiringError, YawbenchError
 from yawbench.orchestrator.plan import Instance, Override, Plan, ValueOrigin, Wire
-from yawbench.orchestrator.scenario.loader import load_scenario
-from yawbench.orchestrator.wiring.make_plan import make_plan
 from yawbench.planner import Planner
 from yawbench.vocabulary.wheels import WHEELS
 

@@ -211,9 +211,9 @@ def _derived(plan: Plan) -> Iterable[Sequence[str]]:
 
 def _beside_tyres(plan: Plan) -> Iterable[Sequence[str]]:
     """Yield the deviation of stiffnesses stated for the axles from those of the scenario's tyres."""
-    from yawbench.orchestrator.wiring.make_plan import TYRE_FORCES
-    from yawbench.orchestrator.wiring.parameters import STATIC_LOADS, STIFFNESSES, known_car
     from yawbench.tyre_stand import cornering_stiffness
+    from yawbench.vehicles.car import TYRE_FORCES
+    from yawbench.vehicles.derivations import STATIC_LOADS, STIFFNESSES, known_car
 
     takers = _grouped(
         ((name, float(instance.parameters[name])), instance.name)
@@ -247,7 +247,7 @@ def _idle(plan: Plan) -> list[str]:
 def _matters(instance: Instance, name: str) -> bool:
     """Return whether a default is worth showing: it concerns the car, its speed or the road."""
     from yawbench.orchestrator.wiring.context import FACTS
-    from yawbench.orchestrator.wiring.suspicious_values import OF_CAR
+    from yawbench.vehicles.suspicious_values import OF_CAR
 
     return name in OF_CAR or any(
         name in fact.inputs or fact.counts(instance, name) for fact in FACTS.values()
@@ -263,7 +263,7 @@ def _shown(value: Value | None, measure: str | None) -> str:
 
 def _wire_rows(plan: Plan) -> Iterable[tuple[str, str, str, str]]:
     """Yield source, target, the control side's view of the source (truth, measured, estimated), variables."""
-    from yawbench.orchestrator.wiring.suspicious_values import seen_as
+    from yawbench.orchestrator.wiring.control_side import seen_as
 
     instances = {instance.name: instance.fmu.variables for instance in plan.instances}
     for (source, target), wires in _grouped(((w.source, w.target), w) for w in plan.wires).items():

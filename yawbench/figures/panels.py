@@ -25,9 +25,9 @@ from yawbench.foundation.errors import ScenarioError
 from yawbench.foundation.messages import cut, fold, hint
 from yawbench.metrics.expressions import columns_of, reference_of, while_moving
 from yawbench.metrics.measures import variable_of, words
-from yawbench.orchestrator.recordings.motion import largest
 from yawbench.orchestrator.results.reader import Results
 from yawbench.orchestrator.signal_names import VARIABLE
+from yawbench.vehicles.motion import largest
 from yawbench.vocabulary.wheels import WHEEL_NAMES, wheels
 
 from .style import (

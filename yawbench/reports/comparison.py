@@ -18,7 +18,6 @@ from yawbench.foundation.messages import counted, resolved, span, star
 from yawbench.metrics.expressions import MetricValue, angles_in, metric, standing_in
 from yawbench.metrics.measures import variable_of
 from yawbench.orchestrator.recordings.gaps import gaps_noted, outside
-from yawbench.orchestrator.recordings.motion import nearest_turn
 from yawbench.orchestrator.results.measurement_results import MeasuredResults
 from yawbench.orchestrator.results.reader import Results
 from yawbench.orchestrator.results.run_record import RunRecord
@@ -26,6 +25,7 @@ from yawbench.orchestrator.scenario.overrides import changed
 from yawbench.orchestrator.signal_names import SignalName
 from yawbench.studies.experiment_result import ExperimentResult
 from yawbench.studies.tables import Table, marked, remarks
+from yawbench.vehicles.motion import nearest_turn
 from yawbench.vocabulary.wheels import WHEELS
 
 from .viewer import View

@@ -31,16 +31,17 @@ from yawbench.foundation.errors import ResultsError, ScenarioError
 from yawbench.metrics.expressions import MetricValue, metric, while_moving
 from yawbench.metrics.measures import variable_of, words
 from yawbench.orchestrator.plan import Override, Plan
-from yawbench.orchestrator.recordings.motion import largest
 from yawbench.orchestrator.results.reader import load_results
-from yawbench.orchestrator.scenario.loader import LoadedScenario, load_scenario
+from yawbench.orchestrator.scenario.loader import LoadedScenario
 from yawbench.orchestrator.scenario.overrides import changed, swap_of, with_changes
 from yawbench.orchestrator.scenario.quantities import convert
 from yawbench.orchestrator.signal_names import SignalName
+from yawbench.planner import Planner
 from yawbench.proving_ground.sine_with_dwell import AMPLITUDE, SIDES
 from yawbench.proving_ground.standard_tests import Evaluation, SeriesRun, StandardTest
 from yawbench.proving_ground.steering_tests import SLOW_STEER, slow_steer_amplitude
 from yawbench.proving_ground.trace import Trace, trace_of
+from yawbench.vehicles.motion import largest
 
 from .claim_schema import text_of
 from .executor import Executor, highest_passing, side_by_side
@@ -69,7 +70,7 @@ FIGURE_SPECS = [
 def comparison(scenario: Path, swaps: Sequence[str], changes: Sequence[Override]) -> LoadedExperiment:
     """Return the experiment that compares a scenario's variants (see `variants`)."""
     runs = variants(scenario, swaps, changes)
-    title = load_scenario(scenario, changes=changes).title or scenario.stem
+    title = Planner().load(scenario, changes).title or scenario.stem
     exchanged = " and ".join(dict.fromkeys(text.partition("=")[0].strip() for text in swaps))
     title = f"{title} ({exchanged} exchanged)"
     return experiment_of(scenario, runs, changes=changes, title=title, figures=FIGURE_SPECS)
@@ -91,7 +92,7 @@ def variants(scenario: Path, swaps: Sequence[str], changes: Sequence[Override]) 
     choices = _choices(swaps)
     if all(len(names) == 1 for names in choices.values()):
         swapped = [swap_of(instance, names[0], "--swap")[0] for instance, names in choices.items()]
-        own = load_scenario(scenario, changes=[*swapped, *changes]).replaced
+        own = Planner().load(scenario, [*swapped, *changes]).replaced
         for instance, names in choices.items():
             fmu = str(scenario.absolute().parent / own[instance]) if is_path(own[instance]) else own[instance]
             names[:0] = [fmu] if fmu not in names else []
@@ -191,7 +192,7 @@ def refinements(
     Raises:
         ScenarioError: the scenario or an option is wrong.
     """
-    loaded = load_scenario(scenario, changes=changes)
+    loaded = Planner().load(scenario, changes)
     if not all(SignalName.parse(signal)):
         raise ScenarioError(
             f"--signal {signal}: write INSTANCE.VARIABLE, for example plant.yaw_rate", code="option-invalid"

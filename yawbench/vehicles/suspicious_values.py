@@ -3,11 +3,6 @@
 Implausible are quantities outside the ranges of `vocabulary.vehicle`: a mass in grams, a wheelbase in mm, a
 yaw inertia that does not fit the mass. Defaults of FMUs are not checked: they are the responsibility of
 their authors.
-
-There is also a note on instances of the control side that use the truth although there is a sensor. The role
-of its source determines what a signal is: an estimator gives estimates, a sensor measurements; a signal from
-elsewhere (the plant, the driver), but not from the control side itself, is the truth, exact and without
-delay, which no real car has.
 """
 
 from __future__ import annotations
@@ -22,59 +17,15 @@ from typing import NamedTuple
 from yawbench.fmus.fmu import Value, Variable
 from yawbench.foundation.errors import Diagnostic, Location
 from yawbench.foundation.messages import fold, listed
+from yawbench.orchestrator.plan import DEFAULT, OF_FILES, Instance, OriginKind
+from yawbench.orchestrator.scenario.loader import LoadedScenario
+from yawbench.orchestrator.scenario.quantities import exact_text, meant_unit, number_and_unit
+from yawbench.orchestrator.wiring.context import FACTS
 from yawbench.vocabulary.roles import without_role
 from yawbench.vocabulary.vehicle import CAR, DYNAMIC_INDEX
 
-from ..plan import DEFAULT, SENSING, Instance, OriginKind, Wire
-from ..scenario.loader import LoadedScenario
-from ..scenario.quantities import exact_text, meant_unit, number_and_unit
-from .context import FACTS
-from .parameters import STIFFNESSES, known_car
-
-CONTROL = ("reference", "controller", "allocator", "wheel_control", "monitor")
-"""Roles that command the car."""
-TRUTH = "truth"
-
-
-def seen_as(wire: Wire, instances: Iterable[Instance]) -> str:
-    """Return the kind of a wire to the control side: "truth", "late truth", "measurement" or "estimate".
-
-    "" if the source is on the control side itself, or the target is not.
-    """
-    roles = {instance.name: instance.role for instance in instances}
-    if roles[wire.target] not in (*CONTROL, "estimator") or roles[wire.source] in CONTROL:
-        return ""
-    truth = "late truth" if wire.output.endswith("_delayed") else TRUTH
-    return SENSING.get(roles[wire.source], truth)
-
-
-def exact(instances: Sequence[Instance], wires: Iterable[Wire]) -> list[Diagnostic]:
-    """Return a note on signals that the control side gets exactly although there is a sensor.
-
-    Instances that only observe, such as a reference for comparison, may use the truth: they do not affect
-    the car.
-    """
-    wires = list(wires)
-    if not any(instance.role == "sensor" for instance in instances):
-        return []
-    steering = _steering(instances, wires)
-    inputs: dict[tuple[str, str], list[str]] = {}
-    for wire in wires:
-        if wire.target in steering and seen_as(wire, instances) == TRUTH:
-            inputs.setdefault((wire.target, wire.source), []).append(wire.input)
-    parts = [f"{listed(fold(names))} of {to} (from {of})" for (to, of), names in inputs.items()]
-    sentence = f"exact, though there is a sensor: {'; '.join(parts)}"
-    return [Diagnostic("sensor-bypassed", sentence, "info")] if parts else []
-
-
-def _steering(instances: Iterable[Instance], wires: Iterable[Wire]) -> set[str]:
-    """Return the instances that affect, directly or through others, one outside the control side."""
-    inside = {instance.name for instance in instances if instance.role in (*CONTROL, "estimator")}
-    reached = {instance.name for instance in instances} - inside
-    while more := {w.source for w in wires if w.target in reached} - reached:
-        reached |= more
-    return reached
-
+from .derivations import STIFFNESSES, known_car
+from .tir import TyreFile
 
 INERTIA = ("yaw_inertia", "mass", "cg_to_front_axle", "cg_to_rear_axle")
 """Parameters that determine the dynamic index."""
@@ -177,8 +128,6 @@ OF_CAR = (*(name for name, quantity in CAR.items() if quantity.needed), *STIFFNE
 """Parameters that describe the car in any instance."""
 IN_FACTS = {name for fact in FACTS.values() for name in (*fact.inputs, *fact.parameters)}
 """Inputs and parameters that facts set."""
-OF_FILES = ("default", "vehicle", "derived", "scenario", "file")
-"""Origins of values that are not overrides."""
 SAME = 1e-9
 """Relative difference of values that count as equal: rounding of a conversion."""
 RADIUS = 0.03
@@ -281,7 +230,7 @@ def _of_tyres(
         if item.name == "tyre" and "pcx1_front" in instances[item.instance].parameters and item.value != law:
             says = f"{item.instance}.tyre is {item.value}: {tyres[0].name} follows {law}"
             yield _warning("tyre-mismatch", f"{item.instance}.tyre", says)
-    radii = {str(f.path.name): f.rolling_radius for f in scenario.tyre_files.values() if f.rolling_radius}
+    radii = {f.path.name: f.rolling_radius for f in scenario.tyre_files.values() if isinstance(f, TyreFile)}
     wheel_radii = [item for item in parameters if item.name == "wheel_radius"]
     for (file, radius), item in product(radii.items(), wheel_radii):
         if isinstance(item.value, float) and radius and abs(item.value / radius - 1.0) > RADIUS:
