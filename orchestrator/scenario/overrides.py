@@ -4,7 +4,7 @@
     --set INSTANCE.PARAMETER=VALUE       a parameter of an instance
     --set vehicle.mass=1200              a parameter of the vehicle file, for all instances
     --set inputs.friction*=0.3           a constant
-    --set friction=0.3, speed=...        a fact (see `wiring.context`)
+    --set friction=0.3, speed=...        a fact (see `vocabulary.facts`)
     --set stop_time=2, step_size=..., algorithm=...     the run
     --set INSTANCE.step_size=0.01        the step of an instance
     --set INSTANCE.validate=false        accept an FMU with an invalid model description
@@ -29,14 +29,16 @@ from typing import Any
 from yawbench.fmus.fmu import Value, is_path
 from yawbench.foundation.errors import Diagnostic, Location, ScenarioError
 from yawbench.foundation.messages import hint, listed
+from yawbench.vocabulary.facts import FACTS
 
 from ..fault_kinds import WORDS, FaultList
 from ..plan import Override, OverrideOrigin
-from ..signal_names import FACTS, FAULTS, INPUTS, OF_RUN, TYRES, VEHICLE, Target
+from ..signal_names import FAULTS, INPUTS, OF_RUN, TYRES, VEHICLE, Target
 from . import yaml_lines
-from .fault_schema import location_of, parse_faults, read_line
-from .schema import ScenarioSpec, Vehicle, at, key_of, plain_value, put
-from .yaml_lines import Document, KeyPath
+from .fault_schema import FaultSpec, location_of, parse_faults, read_line
+from .quantities import instant, seconds
+from .schema import ScenarioSpec, Vehicle, key_of, plain_value
+from .yaml_lines import Document, KeyPath, at, put
 
 
 def read_changes(
@@ -66,7 +68,10 @@ def read_changes(
         target = _settable(name) if equals else None
         if target is not None:
             value = os.path.abspath(raw) if target.kind == "tyres" else yaml_lines.scalar(raw)
-            changes.append(setting(target, value, "--set"))
+            try:
+                changes.append(setting(target, value, "--set"))
+            except ScenarioError as error:
+                errors += error.diagnostics
         else:
             others = listed((*OF_RUN, *FACTS), last="or")
             errors.append(f"--set {text}: write --set INSTANCE.PARAMETER=VALUE, or {others}=VALUE")
@@ -101,11 +106,19 @@ def setting(target: Target, value: Value, origin: OverrideOrigin) -> Override:
     """Return the override of a target; faults are parsed from their line.
 
     Raises:
-        ScenarioError: there is no such kind of fault, or it takes something else.
+        ScenarioError: there is no such kind of fault, or it takes something else, or not a time.
     """
-    if target.kind != "faults":
-        return Override(target, value, origin)
-    return faults_at(target.variable, str(value), origin)
+    if target.kind == "faults":
+        return faults_at(target.variable, str(value), origin)
+    change = Override(target, value, origin)
+    try:
+        if target.is_time:
+            (instant if target.variable == "start_time" else seconds)(value)
+    except ValueError as error:
+        raise ScenarioError(
+            Diagnostic("value-invalid", str(error), location=Location(target=str(change)))
+        ) from None
+    return change
 
 
 def faults_at(place: str, stated: str | Mapping[str, Value], origin: OverrideOrigin) -> Override:
@@ -170,7 +183,7 @@ def swap_of(instance: str, text: str, origin: OverrideOrigin) -> list[Override]:
 def apply_changes(
     document: Document, vehicle: Document, changes: Iterable[Override]
 ) -> tuple[dict[str, str], tuple[Override, ...]]:
-    """Apply overrides of what a scenario consists of: FMUs, files, times, faults; report what cannot be.
+    """Apply overrides of what a scenario consists of (FMUs, files, times), and report what cannot be.
 
     Overrides of values are only checked: `with_values` applies them to the validated scenario. Of several
     overrides of a target, the last one wins.
@@ -191,7 +204,7 @@ def apply_changes(
         elif kind == "tyres":
             differs = _put_tyres(document, vehicle, change)
         elif kind == "faults":
-            differs = _put_faults(document, change, name)
+            differs = True  # see `with_values`
         elif kind in ("fact", "vehicle_parameter", "input"):
             differs = _is_value(document, change)
         elif not isinstance(spec, dict):
@@ -226,6 +239,14 @@ def with_values(
     """Return a scenario and its vehicle with the values that overrides give, and those that differ."""
     effective: list[Override] = []
     for change in changes:
+        if change.faulty:
+            there = [one for one in scenario.faults if str(one.value.on) == change.faulty]
+            effective += [change] if [one.value.fault for one in there] != [*change.faults] else []
+            items = [{"on": change.faulty, **fault.item} for fault in change.faults]
+            own = [replace(change.given(), value=FaultSpec.model_validate(item)) for item in items]
+            others = [one for one in scenario.faults if one not in there]
+            scenario = scenario.model_copy(update={FAULTS: [*others, *own]})
+            continue
         key = key_of(change.target)
         of_vehicle = change.target.kind == "vehicle_parameter"
         before = at(vehicle if of_vehicle else scenario, key)
@@ -261,50 +282,10 @@ def _put_tyres(document: Document, vehicle: Document, change: Override) -> bool:
     return after != named
 
 
-def spelled(place: str) -> str:
-    """Return the location of a fault in its canonical spelling, unchanged if it is malformed."""
-    try:
-        return str(location_of(place))
-    except ValueError:
-        return place
-
-
-def _put_faults(document: Document, change: Override, place: str) -> bool:
-    """Replace the faults of a location, after those of other locations; return whether they differ."""
-    faults = document.data.get(FAULTS) or []
-    if not isinstance(faults, list):
-        return True  # the schema reports the error
-    items = [{"on": place, **fault.item} for fault in change.faults]
-    places = [spelled(str(fault.get("on"))) if isinstance(fault, dict) else None for fault in faults]
-    there = [i for i, at in enumerate(places) if at == place]
-    before = [faults[i] for i in there]
-    faults = document.to_change(())[FAULTS] = [*faults]
-    for i in reversed(there):
-        document.remove((FAULTS,), i)
-    document.overrides |= {(FAULTS, len(faults) + k): change for k in range(len(items))}
-    faults += items
-    if not faults:
-        del document.data[FAULTS]
-    return before != items
-
-
 def leave_unvalidated(document: Document) -> None:
     """Let every instance use its FMU even if the model description is invalid."""
-    for name, spec in _mapping(document.data, "units").items():
-        if isinstance(spec, dict):
-            document.to_change(("units", name))["validate"] = False
-
-
-def apply_to_all_runs(document: Document, changes: Iterable[Override]) -> None:
-    """Add overrides to the `swap`, `set` and `faults` of an experiment, for all of its runs."""
-    for change in changes:
-        target = str(change.target)
-        if change.target.kind == "run":
-            _put(document, (target,), change)
-        elif change.faulty and isinstance(document.data, dict):
-            _put_faults(document, change, change.faulty)
-        else:
-            _put(document, ("swap" if change.swaps else "set", target), change)
+    for name in _mapping(document.data, "units"):
+        document.data = put(document.data, ("units", name, "validate"), False)
 
 
 def _swap(document: Document, instance: str, change: Override) -> bool:
@@ -321,12 +302,9 @@ def _swap(document: Document, instance: str, change: Override) -> bool:
 
 def _put(document: Document, key: KeyPath, change: Override, value: Any = None) -> bool:
     """Set the value at a key, by default that of the override; return whether it differs from before."""
-    holder = document.to_change(key[:-1])
     value = change.value if value is None else value
-    before = holder.get(key[-1])
-    if isinstance(document.data, dict):
-        holder[key[-1]] = value
-        document.overrides[key] = change
+    before, document.data = at(document.data, key), put(document.data, key, value)
+    document.overrides[key] = change
     return _differ(before, value)
 
 

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import lru_cache
@@ -42,15 +42,16 @@ from pydantic_core.core_schema import no_info_after_validator_function
 from yawbench.fmus.fmu import Value
 from yawbench.foundation.errors import Diagnostic
 from yawbench.foundation.messages import listed, short
+from yawbench.vocabulary.facts import FACTS
 from yawbench.vocabulary.vehicle import CAR
 
 from ..coupling_algorithms import ALGORITHMS
 from ..plan import Given, OriginKind, Override, ValueOrigin, ValueSource
-from ..signal_names import FACTS, INPUTS, RESERVED, SignalName, Target, TargetKind
-from .fault_schema import FaultSpec
+from ..signal_names import FAULTS, INPUTS, RESERVED, SignalName, Target, TargetKind
+from .fault_schema import FaultSpec, location_of
 from .quantities import parse_unit
 from .schema_validation import Instant, OneOf, StrictModel, Time, in_unit
-from .yaml_lines import Document, KeyPath
+from .yaml_lines import Document, KeyPath, put
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -368,7 +369,7 @@ class ScenarioSpec(StrictModel):
         None, description="instance.pattern, *.pattern for all instances; default: all outputs but text"
     )
 
-    faults: list[FaultSpec] = Field([], description="Disturbances of signals")
+    faults: list[Annotated[Given[FaultSpec], _AsGiven()]] = Field([], description="Disturbances of signals")
 
     def placed(self, document: Document) -> Self:
         """Return the scenario with the origins and places of its values.
@@ -376,7 +377,7 @@ class ScenarioSpec(StrictModel):
         The source of a value is in the comment on it, else in that above its instance, else that of the file.
         """
 
-        def at(given: Given[Any], *key: str) -> Given[Any]:
+        def at(given: Given[Any], *key: str | int) -> Given[Any]:
             of_instance = document.comment_above(key[:2]) if key[0] == "units" else ""
             comment, line = document.comment(key) or of_instance or self.source, document.lines.get(key, 0)
             origin = _origin("scenario", comment, self.source, str(document.path), line)
@@ -390,7 +391,9 @@ class ScenarioSpec(StrictModel):
             name: unit.model_copy(update={"parameters": all_at(unit.parameters, "units", name, "parameters")})
             for name, unit in self.units.items()
         }
-        return self.model_copy(update={**facts, "units": units, "inputs": all_at(self.inputs, INPUTS)})
+        faults = [at(given, FAULTS, i) for i, given in enumerate(self.faults)]
+        lists = {INPUTS: all_at(self.inputs, INPUTS), FAULTS: faults}
+        return self.model_copy(update={**facts, **lists, "units": units})
 
 
 @dataclass(frozen=True)
@@ -424,22 +427,6 @@ def key_of(target: Target) -> tuple[str, ...]:
         "vehicle_parameter": (PARAMETERS, target.variable),
     }
     return keys.get(target.kind, ())
-
-
-def at(holder: Any, key: Sequence[str | int]) -> Any:
-    """Return the value at a key of nested mappings and models, None if there is none."""
-    for part in key:
-        holder = holder.get(part) if isinstance(holder, dict) else getattr(holder, str(part), None)
-    return holder
-
-
-def put(holder: Any, key: Sequence[str | int], value: Any) -> Any:
-    """Return nested mappings and models with another value at a key; what holds it is copied."""
-    part, *rest = key
-    inner = put(at(holder, [part]), rest, value) if rest else value
-    if isinstance(holder, StrictModel):
-        return holder.model_copy(update={str(part): inner})
-    return {**(holder or {}), part: inner}
 
 
 class LoadedScenario(ScenarioSpec):
@@ -477,7 +464,13 @@ class LoadedScenario(ScenarioSpec):
         """Return the scenario with vehicle file and overrides applied, as JSON-ready data."""
         data = dict(self.document.data)
         for change in self.changes:
-            if (key := key_of(change.target)) and key[0] != PARAMETERS:
+            if change.faulty:
+                before = data.get(FAULTS) or ()
+                data[FAULTS] = [raw for raw in before if str(location_of(raw["on"])) != change.faulty]
+                data[FAULTS] += [{"on": change.faulty, **fault.item} for fault in change.faults]
+                if not data[FAULTS]:
+                    del data[FAULTS]
+            elif (key := key_of(change.target)) and key[0] != PARAMETERS:
                 data = put(data, key, change.value)
         times = {"stop_time": float(self.stop_time), "step_size": float(self.step_size)}
         if self.start_time:

@@ -1,15 +1,6 @@
-"""State shared by all steps of wiring: the scenario, its opened FMUs, errors and notes so far; facts.
+"""State shared by all steps of wiring: the scenario, its opened FMUs, errors and notes so far.
 
-Facts are values that reach all instances that need them:
-
-    friction: 0.65         # every parameter `base_friction` of a road, and every input `friction`,
-                           # `friction_fl` .. `friction_rr` that no wire drives
-    speed: 80 km/h         # every parameter `initial_speed`, `target_speed`
-
-In a scenario file, a value given by its own name takes precedence over a fact; as an override
-(`--set friction=0.3`), a fact takes precedence over the file, so that one override reaches all instances. To
-add a fact, add a row to `FACTS`, its name to `signal_names.FACTS`, and a key to the schema of
-scenarios. `reached` and `found_at` return what the target of an override, such as a fact, sets in a plan.
+`reached` and `found_at` return what the target of an override, such as a fact, sets in a plan.
 """
 
 from __future__ import annotations
@@ -22,36 +13,13 @@ from typing import Any
 from yawbench.fmus.fmu import Fmu, Value, Variable
 from yawbench.foundation.errors import Diagnostic, Location, Severity, WiringError
 from yawbench.foundation.messages import fold_sentences
-from yawbench.vocabulary.wheels import WHEELS, wheels
+from yawbench.vocabulary.facts import FACTS, Fact
+from yawbench.vocabulary.wheels import WHEELS
 
 from ..plan import Given, Instance, Plan
 from ..scenario.loader import LoadedScenario
 from ..scenario.yaml_lines import MOST_ERRORS, KeyPath
-from ..signal_names import FACTS as NAMES
 from ..signal_names import OF_RUN, SignalName, Target, match, matching
-
-
-@dataclass(frozen=True)
-class Fact:
-    """Inputs and parameters that a fact sets."""
-
-    unit: str  # of measurement, of the value
-    inputs: tuple[str, ...] = ()
-    parameters: dict[str, str] = field(default_factory=dict)
-    """Parameter -> another of the same instance that disables it if 0; "" if it is always in use."""
-
-    def counts(self, instance: Instance, parameter: str) -> bool:
-        """Return whether the fact sets a parameter of an instance, and the parameter is in use."""
-        if parameter not in self.parameters:
-            return False
-        return instance.parameter(self.parameters[parameter]) != 0
-
-
-FACTS = {
-    "friction": Fact("1", ("friction", *wheels("friction_*")), {"base_friction": ""}),
-    "speed": Fact("m/s", parameters={"initial_speed": "", "target_speed": "speed_gain"}),
-}
-assert tuple(FACTS) == NAMES
 
 
 def facts_of(scenario: LoadedScenario) -> Iterator[tuple[str, Fact, Given[Value]]]:

@@ -33,13 +33,14 @@ from yawbench.orchestrator.scenario.overrides import read_changes
 from yawbench.orchestrator.scenario.quantities import convert
 from yawbench.orchestrator.scenario.schema import LoadedScenario
 from yawbench.orchestrator.signal_names import Target
-from yawbench.orchestrator.wiring.context import FACTS, facts_of, reached
+from yawbench.orchestrator.wiring.context import facts_of, reached
 from yawbench.orchestrator.wiring.parameters import value_for
 from yawbench.planner import Planner
 from yawbench.reports.page_parts import render
 from yawbench.reports.viewer import Settings, assets, viewer
 from yawbench.reports.viewer_data import PackedRun, pack
 from yawbench.studies.jobs import LASTING, NEEDED, Job, execute, keyed, planned, recorded
+from yawbench.vocabulary.facts import FACTS
 from yawbench.vocabulary.vehicle import CAR
 
 KEPT = 24

@@ -246,8 +246,8 @@ def _idle(plan: Plan) -> list[str]:
 
 def _matters(instance: Instance, name: str) -> bool:
     """Return whether a default is worth showing: it concerns the car, its speed or the road."""
-    from yawbench.orchestrator.wiring.context import FACTS
     from yawbench.vehicles.suspicious_values import OF_CAR
+    from yawbench.vocabulary.facts import FACTS
 
     return name in OF_CAR or any(
         name in fact.inputs or fact.counts(instance, name) for fact in FACTS.values()

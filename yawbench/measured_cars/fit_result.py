@@ -24,9 +24,9 @@ from yawbench.foundation.messages import hint
 from yawbench.foundation.workers import Pool
 from yawbench.orchestrator.scenario import yaml_lines
 from yawbench.orchestrator.signal_names import Target
-from yawbench.orchestrator.wiring.context import FACTS
 from yawbench.planner import Planner
 from yawbench.studies.jobs import NEEDED
+from yawbench.vocabulary.facts import FACTS
 from yawbench.vocabulary.signals import SIGNALS
 from yawbench.vocabulary.vehicle import CAR
 

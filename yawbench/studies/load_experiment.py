@@ -8,7 +8,7 @@ from __future__ import annotations
 import itertools
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
@@ -17,7 +17,7 @@ from yawbench.foundation.errors import ScenarioError
 from yawbench.foundation.messages import hint, short
 from yawbench.foundation.safe_files import reads
 from yawbench.orchestrator.plan import Override
-from yawbench.orchestrator.scenario import loader, overrides, yaml_lines
+from yawbench.orchestrator.scenario import loader, yaml_lines
 from yawbench.orchestrator.scenario.schema_validation import validated
 from yawbench.orchestrator.scenario.yaml_lines import Document, KeyPath
 from yawbench.orchestrator.signal_names import Target
@@ -72,7 +72,6 @@ def load_experiment(path: Path | str, *, changes: Sequence[Override] = ()) -> Lo
     """
     path = Path(path)
     document = yaml_lines.read(path, what="experiment file")
-    overrides.apply_to_all_runs(document, changes)
     spec = validated(ExperimentSpec, document)
     spec = expanded(spec, document)
     runs = {"": NamedRun("", "", "", path.parent / spec.scenario, ())} if spec.scenario else {}
@@ -91,7 +90,7 @@ def load_experiment(path: Path | str, *, changes: Sequence[Override] = ()) -> Lo
     for_all = tuple(change for change in own if change.target not in overridden)
     experiment = LoadedExperiment(path, spec, runs, for_all, tuple(overridden.values()))
     if not document.errors:
-        check_axes(spec, document)
+        check_axes(spec, document, overridden)
         check_names(experiment, document)
     document.raise_errors()
     _ = experiment.recordings  # a mistake in a measurement file is told before the runs are made
@@ -217,9 +216,9 @@ COLUMNS = (RUN, "status", "reason", "warnings", "key")
 """Columns of the table besides axes and metrics."""
 
 
-def check_axes(spec: ExperimentSpec, document: Document) -> None:
-    """Report targets that two axes, or an axis and `set` or `swap`, override."""
-    seen: dict[Target, str] = dict.fromkeys(spec.targets, "set and swap")
+def check_axes(spec: ExperimentSpec, document: Document, overridden: Iterable[Target]) -> None:
+    """Report targets that two axes, or an axis and `set` or `swap`, or an option, override."""
+    seen: dict[Target, str] = dict.fromkeys([*spec.targets, *overridden], "set and swap")
     for name, axis in spec.axes.items():
         for target in axis.targets:
             if target in seen:

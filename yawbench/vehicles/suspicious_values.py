@@ -20,7 +20,7 @@ from yawbench.foundation.messages import fold, listed
 from yawbench.orchestrator.plan import DEFAULT, OF_FILES, Instance, OriginKind
 from yawbench.orchestrator.scenario.loader import LoadedScenario
 from yawbench.orchestrator.scenario.quantities import exact_text, meant_unit, number_and_unit
-from yawbench.orchestrator.wiring.context import FACTS
+from yawbench.vocabulary.facts import FACTS
 from yawbench.vocabulary.roles import without_role
 from yawbench.vocabulary.vehicle import CAR, DYNAMIC_INDEX
 
