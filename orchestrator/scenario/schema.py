@@ -20,6 +20,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import lru_cache
@@ -46,7 +47,7 @@ from yawbench.vocabulary.facts import FACTS
 from yawbench.vocabulary.vehicle import CAR
 
 from ..coupling_algorithms import ALGORITHMS
-from ..plan import Given, OriginKind, Override, ValueOrigin, ValueSource
+from ..plan import Given, Override, ValueOrigin, ValueSource
 from ..signal_names import FAULTS, INPUTS, RESERVED, SignalName, Target, TargetKind
 from .fault_schema import FaultSpec, location_of
 from .quantities import parse_unit
@@ -57,6 +58,7 @@ if TYPE_CHECKING:
     from typing_extensions import Self
 
 AXLES = ("front", "rear")
+PARAMETERS = "parameters"
 
 
 AlgorithmName = Annotated[str, OneOf(ALGORITHMS)]
@@ -166,21 +168,25 @@ class _AsGiven:
         return no_info_after_validator_function(Given, handler.generate_schema(get_args(source)[0]))
 
 
-@lru_cache(maxsize=10_000)
-def _origin(kind: OriginKind, comment: str, of_file: str, path: str, line: int) -> ValueOrigin:
-    source = ValueSource.of_comment(comment, of_file)
-    return ValueOrigin(kind, source=replace(source, file=path, line=line))
+def _placed(given: Given[Any], document: Document, of_file: str, *key: str | int) -> Given[Any]:
+    """Return a value of a scenario or vehicle file with its place, and with its origin.
+
+    The source of a value is in the comment on it, else in that above its instance, else that of the file.
+    """
+    of_vehicle = key[0] == PARAMETERS
+    of_others = (document.comment_above(key[:2]) if key[0] == "units" else "") or of_file
+    comment = document.comment(key) or ("" if of_vehicle else of_others)
+    about = comment, of_file, str(document.path), document.lines.get(key, 0)
+    return replace(given, origin=_origin(of_vehicle, *about), where=document.location(key))
 
 
 @lru_cache(maxsize=10_000)
-def _without_unit(comment: str) -> str:
-    """Return a comment in a vehicle file without the unit that it may begin with."""
-    begin = re.match(r"([^\s,;]+)[,;]?\s*", comment)
-    try:
-        parse_unit(begin[1] if begin else "")
-    except ValueError:
-        return comment
-    return comment[begin.end() :] if begin else comment
+def _origin(of_vehicle: bool, comment: str, of_file: str, path: str, line: int) -> ValueOrigin:
+    begin = re.match(r"([^\s,;]+)[,;]?\s*", comment) if of_vehicle else None
+    with suppress(ValueError):  # a vehicle file's comment may begin with the unit
+        comment = comment[begin.end() :] if begin and parse_unit(begin[1]) else comment
+    source = replace(ValueSource.of_comment(comment, of_file), file=path, line=line)
+    return ValueOrigin("vehicle" if of_vehicle else "scenario", source=source)
 
 
 class TextSpec(StrictModel):
@@ -324,13 +330,11 @@ class Vehicle(StrictModel):
 
     def placed(self, document: Document) -> Self:
         """Return the vehicle with the origins and places of its values."""
-        placed = {}
-        for name, given in self.parameters.items():
-            key = ("parameters", name)
-            comment, line = _without_unit(document.comment(key)), document.lines.get(key, 0)
-            origin = _origin("vehicle", comment, self.source, str(document.path), line)
-            placed[name] = replace(given, origin=origin, where=document.location(key))
-        return self.model_copy(update={"parameters": placed})
+        placed = {
+            name: _placed(given, document, self.source, PARAMETERS, name)
+            for name, given in self.parameters.items()
+        }
+        return self.model_copy(update={PARAMETERS: placed})
 
     @property
     def values(self) -> dict[str, Value]:
@@ -372,28 +376,22 @@ class ScenarioSpec(StrictModel):
     faults: list[Annotated[Given[FaultSpec], _AsGiven()]] = Field([], description="Disturbances of signals")
 
     def placed(self, document: Document) -> Self:
-        """Return the scenario with the origins and places of its values.
-
-        The source of a value is in the comment on it, else in that above its instance, else that of the file.
-        """
+        """Return the scenario with the origins and places of its values."""
 
         def at(given: Given[Any], *key: str | int) -> Given[Any]:
-            of_instance = document.comment_above(key[:2]) if key[0] == "units" else ""
-            comment, line = document.comment(key) or of_instance or self.source, document.lines.get(key, 0)
-            origin = _origin("scenario", comment, self.source, str(document.path), line)
-            return replace(given, origin=origin, where=document.location(key))
+            return _placed(given, document, self.source, *key)
 
         def all_at(values: Mapping[str, Given[Any]], *key: str) -> dict[str, Given[Any]]:
             return {name: at(given, *key, name) for name, given in values.items()}
 
-        facts = {name: at(given, name) for name in FACTS if (given := getattr(self, name)) is not None}
         units = {
-            name: unit.model_copy(update={"parameters": all_at(unit.parameters, "units", name, "parameters")})
+            name: put(unit, [PARAMETERS], all_at(unit.parameters, "units", name, PARAMETERS))
             for name, unit in self.units.items()
         }
+        facts = {name: at(given, name) for name in FACTS if (given := getattr(self, name)) is not None}
         faults = [at(given, FAULTS, i) for i, given in enumerate(self.faults)]
-        lists = {INPUTS: all_at(self.inputs, INPUTS), FAULTS: faults}
-        return self.model_copy(update={**facts, **lists, "units": units})
+        inputs = all_at(self.inputs, INPUTS)
+        return self.model_copy(update={**facts, "units": units, INPUTS: inputs, FAULTS: faults})
 
 
 @dataclass(frozen=True)
@@ -409,9 +407,6 @@ class PropertyFile:
     def record(self) -> dict[str, object]:
         """Return its entry in the run record."""
         return {"file": str(self.path), "sha256": self.sha256, "warnings": list(map(str, self.warnings))}
-
-
-PARAMETERS = "parameters"
 
 
 def key_of(target: Target) -> tuple[str, ...]:
