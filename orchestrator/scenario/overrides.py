@@ -106,7 +106,7 @@ def setting(target: Target, value: Value, origin: OverrideOrigin) -> Override:
     """Return the override of a target; faults are parsed from their line.
 
     Raises:
-        ScenarioError: there is no such kind of fault, or it takes something else, or not a time.
+        ScenarioError: nothing can have such a value, or there is no such kind of fault.
     """
     if target.kind == "faults":
         return faults_at(target.variable, str(value), origin)
@@ -114,6 +114,8 @@ def setting(target: Target, value: Value, origin: OverrideOrigin) -> Override:
     try:
         if target.is_time:
             (instant if target.variable == "start_time" else seconds)(value)
+        elif key_of(target):
+            plain_value(value)
     except ValueError as error:
         raise ScenarioError(
             Diagnostic("value-invalid", str(error), location=Location(target=str(change)))
@@ -185,8 +187,7 @@ def apply_changes(
 ) -> tuple[dict[str, str], tuple[Override, ...]]:
     """Apply overrides of what a scenario consists of (FMUs, files, times), and report what cannot be.
 
-    Overrides of values are only checked: `with_values` applies them to the validated scenario. Of several
-    overrides of a target, the last one wins.
+    Those of values are left to `with_values`. Of several overrides of a target, the last one wins.
 
     Returns:
         swapped instance -> its FMU in the file; the overrides that make a difference, and those of values.
@@ -197,16 +198,13 @@ def apply_changes(
     for change in {change.target: change for change in changes}.values():
         kind, holder, name = change.target.kind, change.target.instance, change.target.variable
         spec = instances.get(holder)
+        differs = True
         if kind == "run":
             differs = _put(document, (name,), change)
-        elif kind == "vehicle_file":
-            differs = True  # see `apply_vehicle`
         elif kind == "tyres":
             differs = _put_tyres(document, vehicle, change)
-        elif kind == "faults":
-            differs = True  # see `with_values`
-        elif kind in ("fact", "vehicle_parameter", "input"):
-            differs = _is_value(document, change)
+        elif not holder:
+            pass  # see `apply_vehicle` and `with_values`
         elif not isinstance(spec, dict):
             known = (*instances, VEHICLE, INPUTS) if name else instances
             sentence = f"the scenario has no instance {holder!r}{hint(holder, known, lead='it has')}"
@@ -218,19 +216,8 @@ def apply_changes(
             differs = _swap(document, holder, change)
         elif kind == "setting":
             differs = _put(document, ("units", holder, name), change)
-        else:
-            differs = _is_value(document, change)
         effective += [change] if differs else []
     return replaced, tuple(effective)
-
-
-def _is_value(document: Document, change: Override) -> bool:
-    """Return True; report a value that nothing can take."""
-    try:
-        plain_value(change.value)
-    except ValueError as error:
-        document.add(Diagnostic("value-invalid", str(error), location=Location(target=str(change))))
-    return True
 
 
 def with_values(

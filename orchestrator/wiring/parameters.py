@@ -254,16 +254,11 @@ def _unknown(instance: str, fmu: Fmu, name: str) -> str:
     return f"{instance} ({fmu.name}) has no parameter {name!r}" + hint(name, names, lead="it has")
 
 
-def no_warnings(scenario: LoadedScenario, instances: Mapping[str, Instance]) -> list[Diagnostic]:
-    """Return no warnings."""
-    return []
-
-
 @dataclass(frozen=True)
 class Domain:
     """What is known of the things that scenarios are about, such as cars; by default nothing."""
 
     parameters: Callable[[WiringContext], Parameters] = Parameters
     """Distributes parameters, and derives those that follow from others."""
-    warnings: Callable[[LoadedScenario, Mapping[str, Instance]], list[Diagnostic]] = no_warnings
+    warnings: Callable[[LoadedScenario, Mapping[str, Instance]], list[Diagnostic]] = lambda *_: []
     """Returns warnings about the values of a scenario's instances."""
