@@ -221,11 +221,6 @@ class Override:
         """
         return cls(Target.parse(target), value, origin)
 
-    def given(self, replaces: Given[Any] | None = None) -> Given[Any]:
-        """Return the value that it gives in place of another."""
-        origin = ValueOrigin(self.origin, source=ValueSource(VARIED, self.origin))
-        return Given(self.value, origin, Location(target=str(self)), replaces)
-
     @property
     def plain(self) -> Value:
         """The value as in names and records, with faults as text."""

@@ -32,7 +32,7 @@ from yawbench.foundation.messages import hint, listed
 from yawbench.vocabulary.facts import FACTS
 
 from ..fault_kinds import WORDS, FaultList
-from ..plan import Override, OverrideOrigin
+from ..plan import VARIED, Given, Override, OverrideOrigin, ValueOrigin, ValueSource
 from ..signal_names import FAULTS, INPUTS, OF_RUN, TYRES, VEHICLE, Target
 from . import yaml_lines
 from .fault_schema import FaultSpec, location_of, parse_faults, read_line
@@ -220,6 +220,12 @@ def apply_changes(
     return replaced, tuple(effective)
 
 
+def _given(change: Override, value: Any, replaces: Given[Any] | None = None) -> Given[Any]:
+    """Return a value that an override gives in place of another."""
+    origin = ValueOrigin(change.origin, source=ValueSource(VARIED, change.origin))
+    return Given(value, origin, Location(target=str(change)), replaces)
+
+
 def with_values(
     scenario: ScenarioSpec, vehicle: Vehicle, changes: Iterable[Override]
 ) -> tuple[ScenarioSpec, Vehicle, tuple[Override, ...]]:
@@ -230,14 +236,14 @@ def with_values(
             there = [one for one in scenario.faults if str(one.value.on) == change.faulty]
             effective += [change] if [one.value.fault for one in there] != [*change.faults] else []
             items = [{"on": change.faulty, **fault.item} for fault in change.faults]
-            own = [replace(change.given(), value=FaultSpec.model_validate(item)) for item in items]
+            own = [_given(change, FaultSpec.model_validate(item)) for item in items]
             others = [one for one in scenario.faults if one not in there]
             scenario = scenario.model_copy(update={FAULTS: [*others, *own]})
             continue
         key = key_of(change.target)
         of_vehicle = change.target.kind == "vehicle_parameter"
         before = at(vehicle if of_vehicle else scenario, key)
-        given = change.given(before)
+        given = _given(change, change.value, before)
         if not key or before is None or _differ(before.value, given.value):
             effective.append(change)
         if key and of_vehicle:
