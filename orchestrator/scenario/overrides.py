@@ -12,8 +12,9 @@
     --fault 'sensor.yaw_rate: freeze from 2 s'          the faults of a signal; `none` removes them
 
 Studies and sweeps have the same targets, `faults.sensor.yaw_rate` for faults, and also `vehicle`, the vehicle
-file itself. Documents store which override set a value, so that later messages name the override instead of
-a line. `changed` has them in words.
+file itself. What a scenario consists of (FMUs, files, times, settings) is replaced before the scenario is
+validated, and its document stores which override did so; a value or fault replaces one of the validated
+scenario (`with_values`). Messages name the override instead of a line. `changed` has them in words.
 """
 
 from __future__ import annotations
