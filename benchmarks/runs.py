@@ -24,6 +24,7 @@ from time import perf_counter, perf_counter_ns
 
 import numpy as np
 
+from tests.cars import load_scenario, make_plan
 from yawbench.fmus.archive import runs_as
 from yawbench.fmus.build import HERE as FMUS
 from yawbench.foundation.interrupts import StopFlag
@@ -34,8 +35,6 @@ from yawbench.orchestrator.master.log import Log
 from yawbench.orchestrator.master.step_loop import Master
 from yawbench.orchestrator.master.step_program import Operation
 from yawbench.orchestrator.plan import Plan
-from yawbench.orchestrator.scenario.loader import load_scenario
-from yawbench.orchestrator.wiring.make_plan import make_plan
 
 DEFAULT = Path(__file__).parents[1] / "scenarios" / "fnn_sideslip" / "25mps.yaml"
 REPEATS = 3

@@ -134,11 +134,10 @@ def case_of(group: str, number: int, seed: int, box: Sandbox) -> tuple[Path, str
 
 def load(file: Path, kind: str, planner: Any) -> None:
     """Read a file as the commands do, up to where runs would begin."""
+    from tests.cars import load_scenario, make_plan
     from yawbench.metrics.expressions import evaluate_all
     from yawbench.orchestrator.plan import Override
     from yawbench.orchestrator.results.reader import load_results
-    from yawbench.orchestrator.scenario.loader import load_scenario
-    from yawbench.orchestrator.wiring.make_plan import make_plan
     from yawbench.studies.load_experiment import load_experiment
 
     fmus, opener = ROOT / "fmus", planner.opener
@@ -271,7 +270,7 @@ def through_loaders(
 
 def command_of(number: int, seed: int, box: Sandbox) -> tuple[list[str], Path]:
     """Return a command line for a case, and its file."""
-    from yawbench.orchestrator.scenario.loader import load_scenario
+    from tests.cars import load_scenario
     from yawbench.studies.load_experiment import load_experiment
 
     r = random.Random(f"{seed}/command/{number}")

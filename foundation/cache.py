@@ -231,10 +231,10 @@ def _hash(content: bytes) -> bytes:
 
 OF_RESULTS = (
     *("fmus/fmu.py", "fmus/archive.py", "fmus/description.py", "fmus/opener.py", "fmus/zip_members.py"),
-    *("orchestrator", "planner.py", "tyre_stand.py"),
+    *("orchestrator", "vehicles", "vocabulary/facts.py", "planner.py", "tyre_stand.py"),
 )
 """Modules and packages of yawbench on which the results of a run depend; FMUs are hashed separately."""
-OF_METRICS = (*OF_RESULTS, "metrics")
+OF_METRICS = (*OF_RESULTS, "vocabulary/motion.py", "metrics")
 """Modules and packages on which the metrics of a run depend."""
 OF_TESTS = (*OF_METRICS, "proving_ground")
 """Modules and packages on which the evaluation of a standard test depends."""

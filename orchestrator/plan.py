@@ -5,17 +5,18 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import TYPE_CHECKING, Any, Final, Generic, Literal, TypeVar
 
 if TYPE_CHECKING:
     import numpy as np
 
 from yawbench.fmus.fmu import Fmu, Value
-from yawbench.foundation.errors import Diagnostic
+from yawbench.foundation.errors import Diagnostic, Location
 from yawbench.foundation.messages import cut
 from yawbench.vocabulary.roles import role_of
 
 from .fault_kinds import FaultList, FaultySignal
+from .scenario.quantities import number_and_unit
 from .signal_names import SignalName, Target
 
 OverrideOrigin = Literal[
@@ -25,6 +26,8 @@ OverrideOrigin = Literal[
 """Maker of an override: an option, a method of the library, a file of many runs, a command or a test."""
 OriginKind = Literal["default", "vehicle", "derived", "scenario", "file"] | OverrideOrigin
 """Kind of a value's origin: its FMU, the vehicle file, a formula, the scenario, a file, or an override."""
+OF_FILES: tuple[OriginKind, ...] = "default", "vehicle", "derived", "scenario", "file"
+"""Kinds of origins that are not overrides."""
 SourceKind = Literal["paper", "literature", "chosen", "erratum", "varied", "neutral"]
 """Kind of a source: "varied" is an override, "neutral" has no source of its own."""
 SENSING = {"sensor": "measurement", "estimator": "estimate"}
@@ -117,6 +120,35 @@ class ValueOrigin:
 
 
 DEFAULT = ValueOrigin("default")
+NOWHERE = Location()
+T = TypeVar("T", covariant=True)
+
+
+@dataclass(frozen=True)
+class Given(Generic[T]):
+    """A value as it was given: in a file, by an override, or by an FMU.
+
+    It is made where the value is read, once, and goes from there to the plan.
+    """
+
+    value: T
+    """As written: a number in SI, text that may name a unit ("90 km/h"), or the name of a file with it."""
+    origin: ValueOrigin = DEFAULT
+    where: Location = NOWHERE
+    """For messages about it."""
+    replaces: Given[T] | None = None
+    """The value of the file that an override replaces."""
+
+    @property
+    def unit(self) -> str:
+        """The unit that the value names, "" if it is a plain number or not a quantity."""
+        written = number_and_unit(self.value) if isinstance(self.value, str) else None
+        return written[1] if written else ""
+
+    @property
+    def changed(self) -> bool:
+        """Whether an override gave it."""
+        return self.origin.kind not in OF_FILES
 
 
 @dataclass(frozen=True)
@@ -128,8 +160,8 @@ class Instance:
     period: int  # in communication steps
     parameters: dict[str, Value]
     constants: dict[str, Value]  # inputs that no wire drives; of those with a series, the first value
-    origins: dict[str, ValueOrigin] = field(default_factory=dict)
-    """Parameter or constant -> where its value comes from."""
+    given: dict[str, Given[Any]] = field(default_factory=dict)
+    """Parameter or constant -> its value as it was given, with its origin."""
     tolerance: float | None = None
     """Relative tolerance of the FMU's solver; None: that of its default experiment, if it has one."""
     series: dict[str, InputSeries] = field(default_factory=dict)
@@ -144,6 +176,10 @@ class Instance:
         """Return the value of a parameter, by default the FMU's start value; None if there is none."""
         variable = self.fmu.variables.get(name)
         return None if variable is None else self.parameters.get(name, variable.start)
+
+    def origin(self, name: str) -> ValueOrigin:
+        """Return where the value of a parameter or constant comes from."""
+        return self.given[name].origin if name in self.given else DEFAULT
 
 
 @dataclass(frozen=True)

@@ -14,13 +14,12 @@ from functools import cache, lru_cache
 from typing import Literal, NamedTuple
 
 from yawbench.foundation.messages import short
+from yawbench.vocabulary.facts import FACTS
 from yawbench.vocabulary.signals import SYMBOLS
 
 TIMES = ("start_time", "stop_time", "step_size")
 OF_RUN = (*TIMES, "algorithm")
 """Override targets that concern the whole run, not an instance."""
-FACTS = ("friction", "speed")
-"""Override targets that reach all instances with such an input or parameter: `wiring.context`."""
 VEHICLE = "vehicle"
 """Override target of the vehicle file, and prefix of its parameters."""
 INPUTS = "inputs"

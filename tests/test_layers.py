@@ -22,6 +22,7 @@ LAYERS = (
     "foundation",
     "fmus",
     "orchestrator",
+    "yawbench.vehicles",
     "yawbench.metrics",
     "yawbench.figures",
     "yawbench.tyre_stand",

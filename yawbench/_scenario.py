@@ -30,7 +30,7 @@ from yawbench.orchestrator.scenario import loader
 from yawbench.orchestrator.scenario.overrides import faults_at, setting, with_changes
 from yawbench.orchestrator.scenario.schema import LoadedScenario
 from yawbench.orchestrator.signal_names import Target
-from yawbench.orchestrator.wiring.context import FACTS
+from yawbench.vocabulary.facts import FACTS
 from yawbench.vocabulary.roles import role_of
 from yawbench.vocabulary.vehicle import CAR
 

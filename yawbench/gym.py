@@ -32,9 +32,9 @@ from yawbench.foundation.errors import ScenarioError
 from yawbench.metrics.plausibility import PlausibilityWatch
 from yawbench.orchestrator.master.simulate import simulate_in_memory
 from yawbench.orchestrator.plan import Plan
-from yawbench.orchestrator.recordings.motion import LEAST_SPEED
 from yawbench.orchestrator.results.reader import Results
 from yawbench.proving_ground.sine_with_dwell import SPUN, amplitudes
+from yawbench.vocabulary.motion import LEAST_SPEED
 
 from . import arguments
 from ._run import Run

@@ -17,6 +17,8 @@ from yawbench.orchestrator.scenario.loader import LoadedScenario, load_scenario
 from yawbench.orchestrator.scenario.yaml_lines import Document
 from yawbench.orchestrator.signal_names import match
 from yawbench.orchestrator.wiring.make_plan import Network, make_plan
+from yawbench.vehicles.car import cars
+from yawbench.vehicles.tir import read_tir
 
 
 class Planner:
@@ -53,7 +55,9 @@ class Planner:
         Raises:
             ScenarioError: with all problems of its files and the overrides.
         """
-        return load_scenario(path, changes=changes, data=data, read=self._read, validate=validate)
+        return load_scenario(
+            path, changes=changes, data=data, read=self._read, read_tyre=read_tir, validate=validate
+        )
 
     def plan(
         self,
@@ -76,7 +80,7 @@ class Planner:
                 signal is not recorded.
         """
         plan = make_plan(
-            scenario, fmus=fmus, opener=self.opener, isolated=isolated, measure=self._measure,
+            scenario, fmus=fmus, opener=self.opener, isolated=isolated, domain=cars(self._measure),
             networks=self._networks,
         )  # fmt: skip
         if not record:

@@ -24,6 +24,7 @@ from yawbench.foundation.errors import Messages, Severity
 from yawbench.metrics.verdict import Relation, Status
 from yawbench.orchestrator.fault_kinds import Fault, FaultList, FaultLocation, FaultName, FaultySignal
 from yawbench.orchestrator.plan import (
+    Given,
     InputSeries,
     Instance,
     OriginKind,
@@ -50,6 +51,7 @@ __all__ = [
     "FaultName",
     "FaultySignal",
     "Fmu",
+    "Given",
     "InputSeries",
     "Instance",
     "Messages",

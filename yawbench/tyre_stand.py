@@ -24,6 +24,8 @@ from yawbench.orchestrator.plan import InputSeries, Instance, Plan
 from yawbench.orchestrator.scenario.loader import load_scenario
 from yawbench.orchestrator.signal_names import SignalName
 from yawbench.orchestrator.wiring.make_plan import make_plan
+from yawbench.vehicles.car import cars
+from yawbench.vehicles.tir import read_tir
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -143,7 +145,9 @@ def put_on_stand(source: str, *, friction: float, fmus: Path | None, build: Buil
         "inputs": {name: friction if name.startswith("friction") else 0.0 for name in inputs},
         **({"tyres": os.path.abspath(source)} if file else {}),
     }
-    return TyreStand(make_plan(load_scenario(near, data=data), opener=opener))
+    return TyreStand(
+        make_plan(load_scenario(near, data=data, read_tyre=read_tir), opener=opener, domain=cars())
+    )
 
 
 def open_role(

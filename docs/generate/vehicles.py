@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from yawbench.orchestrator.wiring import derivations
-from yawbench.orchestrator.wiring.derivations import DERIVATIONS
+from yawbench.vehicles import derivations
+from yawbench.vehicles.derivations import DERIVATIONS
 from yawbench.vocabulary import vehicle
 from yawbench.vocabulary.vehicle import CAR, VehicleQuantity
 

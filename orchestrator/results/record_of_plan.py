@@ -119,7 +119,8 @@ def _fmu(instance: Instance, plan: Plan, sources: dict[ValueSource, int]) -> Fmu
     """Return the record of an instance; adds the sources of its values, with their index."""
     fmu = instance.fmu
     how = fmu.runs_as or runs_as(fmu.path)
-    sourced = {name: origin.source for name, origin in instance.origins.items() if origin.source is not None}
+    origins = {name: given.origin for name, given in instance.given.items() if given.origin != DEFAULT}
+    sourced = {name: origin.source for name, origin in origins.items() if origin.source is not None}
     record = FmuRecord(
         name=fmu.name,
         role=instance.role,
@@ -133,7 +134,7 @@ def _fmu(instance: Instance, plan: Plan, sources: dict[ValueSource, int]) -> Fmu
         step_size=float(instance.period * plan.step),
         tolerance=instance.tolerance or fmu.tolerance,
         parameters=dict(instance.parameters),
-        origins={name: str(origin) for name, origin in instance.origins.items() if origin != DEFAULT},
+        origins={name: str(origin) for name, origin in origins.items()},
         sources={name: sources.setdefault(source, len(sources)) for name, source in sourced.items()},
         defaults={v.name: v.start for v in fmu.of("parameter") if v.name not in instance.parameters},
         constants={name: value for name, value in instance.constants.items() if name not in instance.series},

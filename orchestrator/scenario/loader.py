@@ -16,9 +16,8 @@ from yawbench.foundation.safe_files import TEXT, read_bytes, reads
 
 from ..plan import Override
 from . import overrides, quantities, schema_validation, yaml_lines
-from .schema import Connection, LoadedScenario, ScenarioSpec, Vehicle, endpoint
+from .schema import Connection, LoadedScenario, PropertyFile, ScenarioSpec, Vehicle, endpoint
 from .schema_validation import KINDS
-from .tir import TyreFile, read_tir
 from .yaml_lines import Document, KeyPath
 
 STEPS = 1_000_000_000
@@ -34,6 +33,7 @@ def load_scenario(
     changes: Sequence[Override] = (),
     data: dict[str, Any] | None = None,
     read: Callable[..., Document] = yaml_lines.read,
+    read_tyre: Callable[[str], PropertyFile] | None = None,
     validate: bool = True,
 ) -> LoadedScenario:
     """Read a scenario file, or an SSP archive.
@@ -43,6 +43,7 @@ def load_scenario(
         changes: overrides of the file; see `overrides`.
         data: its content, if there is no such file: messages name `path`.
         read: reads a file, called like `yaml_lines.read`; the returned document is modified.
+        read_tyre: reads a tyre property file; None: the scenario must not name any.
         validate: False: accept FMUs with invalid model descriptions.
 
     Raises:
@@ -67,7 +68,9 @@ def load_scenario(
     if isinstance(document.data, dict):
         _check_time_grid(document)
         _check_instance_names(document)
-    tyres = _read_tyres(file, vehicle, document, vehicle_document)
+    if file is not None and vehicle is not None:
+        file, vehicle, effective = overrides.with_values(file, vehicle, effective)
+    tyres = _read_tyres(file, vehicle, document, vehicle_document, read_tyre or _unread)
     errors = document.sorted_errors() + vehicle_document.sorted_errors()
     if errors or file is None or vehicle is None:
         raise ScenarioError(errors)
@@ -110,17 +113,25 @@ def _read_vehicle(document: Document, read: Callable[..., Document]) -> Document
     return read(vehicle, what="vehicle file")
 
 
+def _unread(path: str) -> PropertyFile:
+    raise ScenarioError(f"{path}: nothing here reads such files", code="file-unreadable")
+
+
 def _read_tyres(
-    scenario: ScenarioSpec | None, vehicle: Vehicle | None, document: Document, vehicle_document: Document
-) -> dict[str, TyreFile]:
+    scenario: ScenarioSpec | None,
+    vehicle: Vehicle | None,
+    document: Document,
+    vehicle_document: Document,
+    read: Callable[[str], PropertyFile],
+) -> dict[str, PropertyFile]:
     """Return the tyre property file of each axle; report its errors and note its warnings."""
     if scenario is None or vehicle is None:
         return {}
     named, where = (scenario.tyres, document) if scenario.tyres else (vehicle.tyres, vehicle_document)
-    files: dict[str, TyreFile] = {}
+    files: dict[str, PropertyFile] = {}
     for name in dict.fromkeys((named or {}).values()):
         try:
-            file = read_tir(os.path.normpath(where.path.parent / name))
+            file = read(os.path.normpath(where.path.parent / name))
         except ScenarioError as error:
             for diagnostic in error.diagnostics:
                 where.report(("tyres",), str(diagnostic), diagnostic.code)

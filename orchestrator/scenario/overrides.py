@@ -1,10 +1,10 @@
-"""Overrides: values that replace those of a scenario before it is validated.
+"""Overrides: values that replace those of a scenario.
 
     --swap INSTANCE=FMU                  the FMU of an instance
     --set INSTANCE.PARAMETER=VALUE       a parameter of an instance
     --set vehicle.mass=1200              a parameter of the vehicle file, for all instances
     --set inputs.friction*=0.3           a constant
-    --set friction=0.3, speed=...        a fact (see `wiring.context`)
+    --set friction=0.3, speed=...        a fact (see `vocabulary.facts`)
     --set stop_time=2, step_size=..., algorithm=...     the run
     --set INSTANCE.step_size=0.01        the step of an instance
     --set INSTANCE.validate=false        accept an FMU with an invalid model description
@@ -12,8 +12,9 @@
     --fault 'sensor.yaw_rate: freeze from 2 s'          the faults of a signal; `none` removes them
 
 Studies and sweeps have the same targets, `faults.sensor.yaw_rate` for faults, and also `vehicle`, the vehicle
-file itself. Documents store which override set a value, so that later messages name the override instead of
-a line. `changed` has them in words.
+file itself. What a scenario consists of (FMUs, files, times, settings) is replaced before the scenario is
+validated, and its document stores which override did so; a value or fault replaces one of the validated
+scenario (`with_values`). Messages name the override instead of a line. `changed` has them in words.
 """
 
 from __future__ import annotations
@@ -29,13 +30,16 @@ from typing import Any
 from yawbench.fmus.fmu import Value, is_path
 from yawbench.foundation.errors import Diagnostic, Location, ScenarioError
 from yawbench.foundation.messages import hint, listed
+from yawbench.vocabulary.facts import FACTS
 
 from ..fault_kinds import WORDS, FaultList
-from ..plan import Override, OverrideOrigin
-from ..signal_names import FACTS, FAULTS, INPUTS, OF_RUN, TYRES, VEHICLE, Target
+from ..plan import VARIED, Given, Override, OverrideOrigin, ValueOrigin, ValueSource
+from ..signal_names import FAULTS, INPUTS, OF_RUN, TYRES, VEHICLE, Target
 from . import yaml_lines
-from .fault_schema import location_of, parse_faults, read_line
-from .yaml_lines import Document, KeyPath
+from .fault_schema import FaultSpec, location_of, parse_faults, read_line
+from .quantities import instant, seconds
+from .schema import ScenarioSpec, Vehicle, key_of, plain_value
+from .yaml_lines import Document, KeyPath, at, put
 
 
 def read_changes(
@@ -65,7 +69,10 @@ def read_changes(
         target = _settable(name) if equals else None
         if target is not None:
             value = os.path.abspath(raw) if target.kind == "tyres" else yaml_lines.scalar(raw)
-            changes.append(setting(target, value, "--set"))
+            try:
+                changes.append(setting(target, value, "--set"))
+            except ScenarioError as error:
+                errors += error.diagnostics
         else:
             others = listed((*OF_RUN, *FACTS), last="or")
             errors.append(f"--set {text}: write --set INSTANCE.PARAMETER=VALUE, or {others}=VALUE")
@@ -100,11 +107,21 @@ def setting(target: Target, value: Value, origin: OverrideOrigin) -> Override:
     """Return the override of a target; faults are parsed from their line.
 
     Raises:
-        ScenarioError: there is no such kind of fault, or it takes something else.
+        ScenarioError: nothing can have such a value, or there is no such kind of fault.
     """
-    if target.kind != "faults":
-        return Override(target, value, origin)
-    return faults_at(target.variable, str(value), origin)
+    if target.kind == "faults":
+        return faults_at(target.variable, str(value), origin)
+    change = Override(target, value, origin)
+    try:
+        if target.is_time:
+            (instant if target.variable == "start_time" else seconds)(value)
+        elif key_of(target):
+            plain_value(value)
+    except ValueError as error:
+        raise ScenarioError(
+            Diagnostic("value-invalid", str(error), location=Location(target=str(change)))
+        ) from None
+    return change
 
 
 def faults_at(place: str, stated: str | Mapping[str, Value], origin: OverrideOrigin) -> Override:
@@ -169,12 +186,12 @@ def swap_of(instance: str, text: str, origin: OverrideOrigin) -> list[Override]:
 def apply_changes(
     document: Document, vehicle: Document, changes: Iterable[Override]
 ) -> tuple[dict[str, str], tuple[Override, ...]]:
-    """Apply overrides to a scenario and its vehicle file; report those that do not apply.
+    """Apply overrides of what a scenario consists of (FMUs, files, times), and report what cannot be.
 
-    Of several overrides of a target, the last one wins.
+    Those of values are left to `with_values`. Of several overrides of a target, the last one wins.
 
     Returns:
-        swapped instance -> its FMU in the file; the overrides that make a difference.
+        swapped instance -> its FMU in the file; the overrides that make a difference, and those of values.
     """
     replaced: dict[str, str] = {}
     effective: list[Override] = []
@@ -182,18 +199,13 @@ def apply_changes(
     for change in {change.target: change for change in changes}.values():
         kind, holder, name = change.target.kind, change.target.instance, change.target.variable
         spec = instances.get(holder)
-        if kind in ("run", "fact"):
+        differs = True
+        if kind == "run":
             differs = _put(document, (name,), change)
-        elif kind == "vehicle_file":
-            differs = True  # see `apply_vehicle`
         elif kind == "tyres":
             differs = _put_tyres(document, vehicle, change)
-        elif kind == "faults":
-            differs = _put_faults(document, change, name)
-        elif kind == "vehicle_parameter":
-            differs = _put(vehicle, ("parameters", name), change)
-        elif kind == "input":
-            differs = _put(document, (INPUTS, name), change)
+        elif not holder:
+            pass  # see `apply_vehicle` and `with_values`
         elif not isinstance(spec, dict):
             known = (*instances, VEHICLE, INPUTS) if name else instances
             sentence = f"the scenario has no instance {holder!r}{hint(holder, known, lead='it has')}"
@@ -205,10 +217,41 @@ def apply_changes(
             differs = _swap(document, holder, change)
         elif kind == "setting":
             differs = _put(document, ("units", holder, name), change)
-        else:
-            differs = _put(document, ("units", holder, "parameters", name), change)
         effective += [change] if differs else []
     return replaced, tuple(effective)
+
+
+def _given(change: Override, value: Any, replaces: Given[Any] | None = None) -> Given[Any]:
+    """Return a value that an override gives in place of another."""
+    origin = ValueOrigin(change.origin, source=ValueSource(VARIED, change.origin))
+    return Given(value, origin, Location(target=str(change)), replaces)
+
+
+def with_values(
+    scenario: ScenarioSpec, vehicle: Vehicle, changes: Iterable[Override]
+) -> tuple[ScenarioSpec, Vehicle, tuple[Override, ...]]:
+    """Return a scenario and its vehicle with the values that overrides give, and those that differ."""
+    effective: list[Override] = []
+    for change in changes:
+        if change.faulty:
+            there = [one for one in scenario.faults if str(one.value.on) == change.faulty]
+            effective += [change] if [one.value.fault for one in there] != [*change.faults] else []
+            items = [{"on": change.faulty, **fault.item} for fault in change.faults]
+            own = [_given(change, FaultSpec.model_validate(item)) for item in items]
+            others = [one for one in scenario.faults if one not in there]
+            scenario = scenario.model_copy(update={FAULTS: [*others, *own]})
+            continue
+        key = key_of(change.target)
+        of_vehicle = change.target.kind == "vehicle_parameter"
+        before = at(vehicle if of_vehicle else scenario, key)
+        given = _given(change, change.value, before)
+        if not key or before is None or _differ(before.value, given.value):
+            effective.append(change)
+        if key and of_vehicle:
+            vehicle = put(vehicle, key, given)
+        elif key:
+            scenario = put(scenario, key, given)
+    return scenario, vehicle, tuple(effective)
 
 
 def apply_vehicle(document: Document, changes: Iterable[Override]) -> None:
@@ -233,50 +276,10 @@ def _put_tyres(document: Document, vehicle: Document, change: Override) -> bool:
     return after != named
 
 
-def spelled(place: str) -> str:
-    """Return the location of a fault in its canonical spelling, unchanged if it is malformed."""
-    try:
-        return str(location_of(place))
-    except ValueError:
-        return place
-
-
-def _put_faults(document: Document, change: Override, place: str) -> bool:
-    """Replace the faults of a location, after those of other locations; return whether they differ."""
-    faults = document.data.get(FAULTS) or []
-    if not isinstance(faults, list):
-        return True  # the schema reports the error
-    items = [{"on": place, **fault.item} for fault in change.faults]
-    places = [spelled(str(fault.get("on"))) if isinstance(fault, dict) else None for fault in faults]
-    there = [i for i, at in enumerate(places) if at == place]
-    before = [faults[i] for i in there]
-    faults = document.to_change(())[FAULTS] = [*faults]
-    for i in reversed(there):
-        document.remove((FAULTS,), i)
-    document.overrides |= {(FAULTS, len(faults) + k): change for k in range(len(items))}
-    faults += items
-    if not faults:
-        del document.data[FAULTS]
-    return before != items
-
-
 def leave_unvalidated(document: Document) -> None:
     """Let every instance use its FMU even if the model description is invalid."""
-    for name, spec in _mapping(document.data, "units").items():
-        if isinstance(spec, dict):
-            document.to_change(("units", name))["validate"] = False
-
-
-def apply_to_all_runs(document: Document, changes: Iterable[Override]) -> None:
-    """Add overrides to the `swap`, `set` and `faults` of an experiment, for all of its runs."""
-    for change in changes:
-        target = str(change.target)
-        if change.target.kind == "run":
-            _put(document, (target,), change)
-        elif change.faulty and isinstance(document.data, dict):
-            _put_faults(document, change, change.faulty)
-        else:
-            _put(document, ("swap" if change.swaps else "set", target), change)
+    for name in _mapping(document.data, "units"):
+        document.data = put(document.data, ("units", name, "validate"), False)
 
 
 def _swap(document: Document, instance: str, change: Override) -> bool:
@@ -293,14 +296,14 @@ def _swap(document: Document, instance: str, change: Override) -> bool:
 
 def _put(document: Document, key: KeyPath, change: Override, value: Any = None) -> bool:
     """Set the value at a key, by default that of the override; return whether it differs from before."""
-    holder = document.to_change(key[:-1])
     value = change.value if value is None else value
-    before = holder.get(key[-1])
-    if isinstance(document.data, dict):
-        holder[key[-1]] = value
-        document.overrides[key] = change
-        document.before.setdefault(key, before)
-    return before != value or isinstance(before, bool) != isinstance(value, bool)
+    before, document.data = at(document.data, key), put(document.data, key, value)
+    document.overrides[key] = change
+    return _differ(before, value)
+
+
+def _differ(before: Any, after: Any) -> bool:
+    return before != after or isinstance(before, bool) != isinstance(after, bool)
 
 
 def _mapping(data: Any, name: str) -> dict[str, Any]:

@@ -401,10 +401,6 @@ def instant(value: object) -> Fraction:
     Raises:
         ValueError: not a time.
     """
-    return _instant(value) if isinstance(value, (str, float, int)) else _point(value)
-
-
-def _point(value: object) -> Fraction:
     time = _time(value)
     if abs(time) > LONGEST_QUANTITY:
         raise ValueError(f"must be a time of at most {LONGEST_QUANTITY:g} s (got {value!r})")
@@ -417,10 +413,6 @@ def seconds(value: object) -> Fraction:
     Raises:
         ValueError: not a positive time.
     """
-    return _seconds(value) if isinstance(value, (str, float, int)) else _duration(value)
-
-
-def _duration(value: object) -> Fraction:
     time = _time(value)
     if not 0 < time <= LONGEST_QUANTITY:
         limit = f" and at most {LONGEST_QUANTITY:g} s" if time > 0 else ""
@@ -428,10 +420,6 @@ def _duration(value: object) -> Fraction:
     if time < SHORTEST:
         raise ValueError(f"must be a time of at least {float(SHORTEST):g} s (got {value!r})")
     return time
-
-
-_instant = lru_cache(maxsize=10_000, typed=True)(_point)
-_seconds = lru_cache(maxsize=10_000, typed=True)(_duration)
 
 
 def exact_text(time: Fraction) -> str:
@@ -443,11 +431,18 @@ def exact_text(time: Fraction) -> str:
 
 
 def _time(value: object) -> Fraction:
+    if isinstance(value, Fraction):
+        return value
+    if isinstance(value, (str, int, float)) and not isinstance(value, bool):
+        return _exact(value)
+    raise ValueError(f"must be a time in s (got {short(value)})")
+
+
+@lru_cache(maxsize=10_000, typed=True)
+def _exact(value: str | float) -> Fraction:
     if isinstance(value, str):
         plain = len(value) <= WRITTEN and _FRACTION.fullmatch(value)
         return Fraction(value if plain else convert(value, "s"))
-    if isinstance(value, Fraction):
-        return value
-    if isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < math.inf:
-        return Fraction(repr(value))
-    raise ValueError(f"must be a time in s (got {short(value)})")
+    if not abs(value) < math.inf:
+        raise ValueError(f"must be a time in s (got {short(value)})")
+    return Fraction(repr(value))

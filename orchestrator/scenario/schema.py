@@ -19,9 +19,13 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import lru_cache
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
 
 from pydantic import (
     AfterValidator,
@@ -34,20 +38,27 @@ from pydantic import (
     WithJsonSchema,
     model_validator,
 )
+from pydantic_core.core_schema import no_info_after_validator_function
 
 from yawbench.fmus.fmu import Value
+from yawbench.foundation.errors import Diagnostic
 from yawbench.foundation.messages import listed, short
+from yawbench.vocabulary.facts import FACTS
 from yawbench.vocabulary.vehicle import CAR
 
 from ..coupling_algorithms import ALGORITHMS
-from ..plan import Override
-from ..signal_names import RESERVED, SignalName
-from .fault_schema import FaultSpec
+from ..plan import Given, Override, ValueOrigin, ValueSource
+from ..signal_names import FAULTS, INPUTS, RESERVED, SignalName, Target, TargetKind
+from .fault_schema import FaultSpec, location_of
+from .quantities import parse_unit
 from .schema_validation import Instant, OneOf, StrictModel, Time, in_unit
-from .tir import TyreFile
-from .yaml_lines import Document, KeyPath
+from .yaml_lines import Document, KeyPath, put
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
 
 AXLES = ("front", "rear")
+PARAMETERS = "parameters"
 
 
 AlgorithmName = Annotated[str, OneOf(ALGORITHMS)]
@@ -73,7 +84,12 @@ def _unit_name(name: str) -> str:
     return name
 
 
-def _plain(value: object) -> Value:
+def plain_value(value: object) -> Value:
+    """Return a value for a parameter or an input, unconverted.
+
+    Raises:
+        ValueError: it is neither a finite number nor true or false nor text.
+    """
     if isinstance(value, float) and not math.isfinite(value):
         raise ValueError(f"must be a finite number (got {value!r})")
     if isinstance(value, (bool, int, float, str)):
@@ -122,7 +138,9 @@ _OF_AXLES = {
     "additionalProperties": False,
 }
 
-Scalar = Annotated[Value, PlainValidator(_plain), WithJsonSchema({"type": ["number", "string", "boolean"]})]
+Scalar = Annotated[
+    Value, PlainValidator(plain_value), WithJsonSchema({"type": ["number", "string", "boolean"]})
+]
 Tolerance = Annotated[
     float,
     PlainValidator(_tolerance),
@@ -143,6 +161,34 @@ InstanceName = Annotated[
 ]
 
 
+class _AsGiven:
+    """Validates `Given[T]` as T; `placed` adds its origin and place, which only the document knows."""
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
+        return no_info_after_validator_function(Given, handler.generate_schema(get_args(source)[0]))
+
+
+def _placed(given: Given[Any], document: Document, of_file: str, *key: str | int) -> Given[Any]:
+    """Return a value of a scenario or vehicle file with its place, and with its origin.
+
+    The source of a value is in the comment on it, else in that above its instance, else that of the file.
+    """
+    of_vehicle = key[0] == PARAMETERS
+    of_others = (document.comment_above(key[:2]) if key[0] == "units" else "") or of_file
+    comment = document.comment(key) or ("" if of_vehicle else of_others)
+    about = comment, of_file, str(document.path), document.lines.get(key, 0)
+    return replace(given, origin=_origin(of_vehicle, *about), where=document.location(key))
+
+
+@lru_cache(maxsize=10_000)
+def _origin(of_vehicle: bool, comment: str, of_file: str, path: str, line: int) -> ValueOrigin:
+    begin = re.match(r"([^\s,;]+)[,;]?\s*", comment) if of_vehicle else None
+    with suppress(ValueError):  # a vehicle file's comment may begin with the unit
+        comment = comment[begin.end() :] if begin and parse_unit(begin[1]) else comment
+    source = replace(ValueSource.of_comment(comment, of_file), file=path, line=line)
+    return ValueOrigin("vehicle" if of_vehicle else "scenario", source=source)
+
+
 class TextSpec(StrictModel):
     """The text of a file (UTF-8) as the value of a text parameter, such as the patches of a road."""
 
@@ -156,6 +202,7 @@ def _form(value: object) -> str:
 ParameterValue = Annotated[
     Annotated[Scalar, Tag("value")] | Annotated[TextSpec, Tag("of file")], Discriminator(_form)
 ]
+GivenParameter = Annotated[Given[ParameterValue], _AsGiven()]
 
 
 class InstanceSpec(StrictModel):
@@ -163,7 +210,7 @@ class InstanceSpec(StrictModel):
 
     fmu: str = Field(description="Name of an FMU in fmus/, or the path of any .fmu", min_length=1)
     step_size: Time | None = Field(None, description="s, an integer multiple of the communication step")
-    parameters: dict[str, ParameterValue] = Field({}, description="Values of the instance's parameters")
+    parameters: dict[str, GivenParameter] = Field({}, description="Values of the instance's parameters")
     tolerance: Tolerance | None = Field(
         None,
         description="Relative tolerance of the FMU's own solver; default: that of its default experiment",
@@ -202,6 +249,7 @@ class SeriesSpec(StrictModel):
 InputValue = Annotated[
     Annotated[Scalar, Tag("value")] | Annotated[SeriesSpec, Tag("of file")], Discriminator(_form)
 ]
+GivenInput = Annotated[Given[InputValue], _AsGiven()]
 
 
 class Connection(StrictModel):
@@ -256,8 +304,9 @@ class Connection(StrictModel):
         return (1.0 if self.gain is None else self.gain, 0.0 if self.offset is None else self.offset)
 
 
-Friction = Annotated[Scalar, WithJsonSchema(in_unit("1"))]
-Speed = Annotated[Scalar, WithJsonSchema(in_unit("m/s"))]
+Friction = Annotated[Given[Scalar], _AsGiven(), WithJsonSchema(in_unit("1"))]
+Speed = Annotated[Given[Scalar], _AsGiven(), WithJsonSchema(in_unit("m/s"))]
+GivenScalar = Annotated[Given[Scalar], _AsGiven()]
 
 
 def _of_car() -> dict[str, Any]:
@@ -275,9 +324,22 @@ class Vehicle(StrictModel):
     tyres: Tyres | None = Field(
         None, description="Tyre property file (.tir), or front: and rear: of one each, relative to this file"
     )
-    parameters: Annotated[dict[str, Scalar], WithJsonSchema(_of_car())] = Field(
+    parameters: Annotated[dict[str, GivenScalar], WithJsonSchema(_of_car())] = Field(
         {}, description="Parameter name -> value"
     )
+
+    def placed(self, document: Document) -> Self:
+        """Return the vehicle with the origins and places of its values."""
+        placed = {
+            name: _placed(given, document, self.source, PARAMETERS, name)
+            for name, given in self.parameters.items()
+        }
+        return self.model_copy(update={PARAMETERS: placed})
+
+    @property
+    def values(self) -> dict[str, Value]:
+        """The parameters as written."""
+        return {name: given.value for name, given in self.parameters.items()}
 
 
 class ScenarioSpec(StrictModel):
@@ -304,14 +366,62 @@ class ScenarioSpec(StrictModel):
     )
     friction: Friction | None = Field(None, description="Friction of the road, for all instances that use it")
     speed: Speed | None = Field(None, description="m/s, initial speed, and target of the driver")
-    inputs: dict[str, InputValue] = Field({}, description="[instance.]pattern -> constant or time series")
+    inputs: dict[str, GivenInput] = Field({}, description="[instance.]pattern -> constant or time series")
     units: dict[InstanceName, InstanceSpec] = Field(description="Name -> instance", min_length=1)
     connections: list[Connection] = Field([], description="Connections beyond equal names")
     record: list[Variables] | None = Field(
         None, description="instance.pattern, *.pattern for all instances; default: all outputs but text"
     )
 
-    faults: list[FaultSpec] = Field([], description="Disturbances of signals")
+    faults: list[Annotated[Given[FaultSpec], _AsGiven()]] = Field([], description="Disturbances of signals")
+
+    def placed(self, document: Document) -> Self:
+        """Return the scenario with the origins and places of its values."""
+
+        def at(given: Given[Any], *key: str | int) -> Given[Any]:
+            return _placed(given, document, self.source, *key)
+
+        def all_at(values: Mapping[str, Given[Any]], *key: str) -> dict[str, Given[Any]]:
+            return {name: at(given, *key, name) for name, given in values.items()}
+
+        units = {
+            name: put(unit, [PARAMETERS], all_at(unit.parameters, "units", name, PARAMETERS))
+            for name, unit in self.units.items()
+        }
+        facts = {name: at(given, name) for name in FACTS if (given := getattr(self, name)) is not None}
+        faults = [at(given, FAULTS, i) for i, given in enumerate(self.faults)]
+        inputs = all_at(self.inputs, INPUTS)
+        return self.model_copy(update={**facts, "units": units, INPUTS: inputs, FAULTS: faults})
+
+
+@dataclass(frozen=True)
+class PropertyFile:
+    """A file with the parameters of a part of a car, such as a tyre."""
+
+    path: Path
+    sha256: str
+    values: Mapping[str, float]
+    """Parameter name -> its value in SI units."""
+    warnings: tuple[Diagnostic, ...]
+
+    def record(self) -> dict[str, object]:
+        """Return its entry in the run record."""
+        return {"file": str(self.path), "sha256": self.sha256, "warnings": list(map(str, self.warnings))}
+
+
+def key_of(target: Target) -> tuple[str, ...]:
+    """Return the key of the value that a target addresses, in a scenario or in its vehicle file.
+
+    Returns:
+        () if it addresses something else: an FMU, a file, times, faults.
+    """
+    keys: dict[TargetKind, tuple[str, ...]] = {
+        "fact": (target.variable,),
+        "input": (INPUTS, target.variable),
+        "parameter": ("units", target.instance, PARAMETERS, target.variable),
+        "vehicle_parameter": (PARAMETERS, target.variable),
+    }
+    return keys.get(target.kind, ())
 
 
 class LoadedScenario(ScenarioSpec):
@@ -323,7 +433,7 @@ class LoadedScenario(ScenarioSpec):
     vehicle_document: InstanceOf[Document]
     vehicle_file: Vehicle
     """Parameters for every instance that declares them; empty if there is no vehicle file."""
-    tyre_files: dict[str, InstanceOf[TyreFile]]
+    tyre_files: dict[str, InstanceOf[PropertyFile]]
     """Axle -> its tyre property file, for every instance that declares the parameters; may be empty."""
     replaced: dict[str, str]
     """Swapped instance -> its FMU in the file."""
@@ -348,13 +458,22 @@ class LoadedScenario(ScenarioSpec):
     def as_run(self) -> dict[str, Any]:
         """Return the scenario with vehicle file and overrides applied, as JSON-ready data."""
         data = dict(self.document.data)
+        for change in self.changes:
+            if change.faulty:
+                before = data.get(FAULTS) or ()
+                data[FAULTS] = [raw for raw in before if str(location_of(raw["on"])) != change.faulty]
+                data[FAULTS] += [{"on": change.faulty, **fault.item} for fault in change.faults]
+                if not data[FAULTS]:
+                    del data[FAULTS]
+            elif (key := key_of(change.target)) and key[0] != PARAMETERS:
+                data = put(data, key, change.value)
         times = {"stop_time": float(self.stop_time), "step_size": float(self.step_size)}
         if self.start_time:
             times["start_time"] = float(self.start_time)
         tyres = {axle: file.record() for axle, file in self.tyre_files.items()}
         vehicle = {"vehicle_title": self.vehicle_file.title, "vehicle_source": self.vehicle_file.source}
         return {
-            **{"file": str(self.path), **data, **times, "vehicle_parameters": self.vehicle_file.parameters},
+            **{"file": str(self.path), **data, **times, "vehicle_parameters": self.vehicle_file.values},
             **(vehicle if self.vehicle else {}),
             **({"tyre_files": tyres} if tyres else {}),
         }

@@ -8,7 +8,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, PlainSerializer, PlainValidator, ValidationError, WithJsonSchema
 from pydantic_core.core_schema import no_info_after_validator_function
@@ -16,10 +16,13 @@ from pydantic_core.core_schema import no_info_after_validator_function
 from yawbench.foundation.errors import Location, ScenarioError, code_of
 from yawbench.foundation.messages import closest, listed, short
 
+from ..plan import Given
 from .quantities import instant, quantity_pattern, seconds
 from .yaml_lines import Document, KeyPath
 
-Model = TypeVar("Model", bound=BaseModel)
+if TYPE_CHECKING:
+    from typing_extensions import Self
+
 JsonSchema = dict[str, Any]
 
 
@@ -85,7 +88,12 @@ class StrictModel(BaseModel):
 
     model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
 
+    def placed(self, document: Document) -> Self:
+        """Return the content with what only its document knows: the origins and places of values."""
+        return self
 
+
+Model = TypeVar("Model", bound=StrictModel)
 KINDS: dict[str, tuple[str, type, str]] = {
     "tuning": ("a tuning file", dict, "; it is for `yawbench tune`"),
     "runs": ("a study file", list, "; it is for `yawbench study` and `report`"),
@@ -114,7 +122,7 @@ def validate(model: type[Model], document: Document) -> Model | None:
         document.report((), another, "file-wrong-kind")
         return None
     try:
-        content = model.model_validate(data)
+        content = model.model_validate(data).placed(document)
     except ValidationError as errors:
         for error in errors.errors(include_url=False):
             _report(model, document, _place(data, error["loc"]), error)
@@ -224,8 +232,8 @@ def _keys(model: type[BaseModel], key: KeyPath) -> list[str]:
 
 
 def _plain(annotation: Any) -> Any:
-    """Return an annotation without `| None` and without the metadata of Annotated."""
-    if typing.get_origin(annotation) is typing.Annotated:
+    """Return an annotation without `| None`, without `Given`, and without the metadata of Annotated."""
+    if typing.get_origin(annotation) in (typing.Annotated, Given):
         return _plain(typing.get_args(annotation)[0])
     if typing.get_origin(annotation) in (types.UnionType, typing.Union):
         arms = [arm for arm in typing.get_args(annotation) if arm is not types.NoneType]

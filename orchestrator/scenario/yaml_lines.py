@@ -9,6 +9,7 @@ from copy import copy
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
+from types import NoneType
 from typing import Any
 
 from yawbench.foundation.errors import Diagnostic, Location, ScenarioError
@@ -44,8 +45,6 @@ class Document:
     lines: dict[KeyPath, int] = field(default_factory=dict)
     overrides: dict[KeyPath, Override] = field(default_factory=dict)
     """Key of an overridden value -> its override."""
-    before: dict[KeyPath, Any] = field(default_factory=dict)
-    """Key of an overridden value -> that of the file; None: it has none."""
     errors: dict[Diagnostic, None] = field(default_factory=dict)
     """An ordered set."""
     comments: dict[int, str] = field(default_factory=dict)
@@ -60,23 +59,9 @@ class Document:
     def fresh(self) -> Document:
         """Return a document with the same content, and overrides, errors and notes of its own."""
         return replace(
-            self, lines={**self.lines}, overrides={**self.overrides}, before={**self.before},
-            errors={**self.errors}, notes=[*self.notes],
+            self, lines={**self.lines}, overrides={**self.overrides}, errors={**self.errors},
+            notes=[*self.notes],
         )  # fmt: skip
-
-    def to_change(self, key: KeyPath) -> dict[str | int, Any]:
-        """Return the mapping at `key`, added if it is missing, in order to change it.
-
-        It and those around it are copied first: `fresh` documents share their data. Without a mapping there
-        the result is empty, and changes of it are lost.
-        """
-        self.data = holder = copy(self.data)
-        for part in key:
-            if isinstance(holder, dict):
-                inner = holder.get(part)
-                holder[part] = {} if inner is None else copy(inner)
-                holder = holder[part]
-        return holder if isinstance(holder, dict) else {}
 
     def report(self, key: KeyPath, sentence: str, code: str = ScenarioError.default_code) -> None:
         """Add an error about the value (or the missing value) at `key`."""
@@ -122,21 +107,6 @@ class Document:
             line -= 1
         return " ".join(lines)
 
-    def remove(self, key: KeyPath, i: int) -> None:
-        """Remove item `i` of the list at `key`; the lines and overrides of later items move with them."""
-        holder = self.data
-        for part in key:
-            holder = holder[part]
-        del holder[i]
-        n = len(key)
-        of_both: tuple[dict[KeyPath, Any], ...] = (self.lines, self.overrides)
-        for kept in of_both:
-            for place in [place for place in kept if place[:n] == key and place[n:] >= (i,)]:
-                value, at = kept.pop(place), place[n]
-                if isinstance(at, int) and at > i:
-                    moved = (*key, at - 1, *place[n + 1 :])
-                    kept[moved] = value
-
     def sorted_errors(self) -> list[Diagnostic]:
         """Return all errors, first those of overrides, then those of the file in the order of lines."""
         return sorted(self.errors, key=lambda error: error.location.line or 0)
@@ -145,6 +115,25 @@ class Document:
         """Raise all errors, if there are any, as one ScenarioError."""
         if self.errors:
             raise ScenarioError(self.sorted_errors())
+
+
+def at(holder: Any, key: Sequence[str | int]) -> Any:
+    """Return the value at a key of nested mappings and models, None if there is none."""
+    for part in key:
+        holder = holder.get(part) if isinstance(holder, dict) else getattr(holder, str(part), None)
+    return holder
+
+
+def put(holder: Any, key: Sequence[str | int], value: Any) -> Any:
+    """Return nested mappings and models with another value at a key; what holds it is copied.
+
+    Something else, in place of a mapping, is returned as it is: the schema reports it.
+    """
+    part, *rest = key
+    inner = put(at(holder, [part]), rest, value) if rest else value
+    if isinstance(holder, (dict, NoneType)):
+        return {**(holder or {}), part: inner}
+    return holder.model_copy(update={str(part): inner}) if hasattr(holder, "model_copy") else holder
 
 
 def dotted(key: KeyPath) -> str:

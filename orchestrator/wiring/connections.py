@@ -275,7 +275,7 @@ class Connector:
             unless = "" if constant.of_instance else f", unless its key names {wire.target}"
             driven = f"{wire.target}.{wire.input} is driven by {wire.source}.{wire.output}"
             self._report(
-                constant.key,
+                constant.given.where,
                 f"{driven}: a constant is for inputs that no instance drives{unless}",
                 "constant-overruled",
             )

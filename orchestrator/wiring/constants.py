@@ -13,14 +13,14 @@ from yawbench.fmus.fmu import Value, Variable
 from yawbench.foundation.errors import InvalidValueError, ScenarioError, code_of, text_of
 from yawbench.foundation.messages import fold, hint, resolved, span
 
-from ..plan import InputSeries, ValueOrigin
+from ..plan import Given, InputSeries
 from ..scenario.loader import LoadedScenario
 from ..scenario.quantities import unit_of
 from ..scenario.schema import SeriesSpec
 from ..scenario.yaml_lines import KeyPath
 from ..signal_names import SignalName
 from .context import WiringContext, facts_of
-from .parameters import origin, value_for
+from .parameters import value_for
 
 if TYPE_CHECKING:
     import numpy as np
@@ -40,7 +40,7 @@ class Constant:
 
     value: Value | InputSeries
     key: KeyPath
-    origin: ValueOrigin
+    given: Given[Any]
     of_instance: bool  # the key names the instance, so it takes precedence over equal names
     exact: bool  # the key is not a pattern
     precedence: int = INPUTS
@@ -60,11 +60,11 @@ def constants(system: WiringContext) -> dict[Input, Constant]:
     """Return the constant of each input, from the scenario's `inputs` and facts."""
     scenario, fmus, inputs = system.scenario, system.fmus, system.inputs
     read = None
-    if any(isinstance(raw, SeriesSpec) for raw in scenario.inputs.values()):
+    if any(isinstance(given.value, SeriesSpec) for given in scenario.inputs.values()):
         read = _series_reader(system)
     by_input = dict(_of_facts(system))
     fact_changed = any(constant.precedence == CHANGED_FACT for constant in by_input.values())
-    for pattern, raw in scenario.inputs.items():
+    for pattern, given in scenario.inputs.items():
         key: KeyPath = ("inputs", pattern)
         prefix, name_pattern = SignalName.parse_input(pattern, fmus)
         of_instance = prefix in fmus
@@ -82,22 +82,23 @@ def constants(system: WiringContext) -> dict[Input, Constant]:
         elif not parts:
             names = fold(list(dict.fromkeys(name for instance in instances for name in inputs[instance])))
             system.report(
-                key, f"no input matches{hint(name_pattern, names, lead='there are')}", "variable-unknown"
+                given.where,
+                f"no input matches{hint(name_pattern, names, lead='there are')}",
+                "variable-unknown",
             )
         for (instance, name), part in parts.items():
             variable = inputs[instance][name]
             value: Value | InputSeries = 0
             try:
-                if isinstance(raw, SeriesSpec):
+                if isinstance(given.value, SeriesSpec):
                     assert read is not None
-                    value = read(raw, part, variable)
+                    value = read(given.value, part, variable)
                 else:
-                    value = value_for(variable, raw)
+                    value = value_for(variable, given.value)
             except ValueError as error:
-                system.report(key, f"{error}, for {instance}.{name}", code_of(error))
-            precedence = CHANGED_INPUTS if fact_changed and scenario.document.override(key) else INPUTS
-            given_by = origin(scenario, key)
-            constant = Constant(value, key, given_by, of_instance, "*" not in pattern, precedence)
+                system.report(given.where, f"{error}, for {instance}.{name}", code_of(error))
+            precedence = CHANGED_INPUTS if fact_changed and given.changed else INPUTS
+            constant = Constant(value, key, given, of_instance, "*" not in pattern, precedence)
             other = by_input.setdefault((instance, name), constant)
             if other.rank < constant.rank:
                 by_input[instance, name] = constant
@@ -105,7 +106,7 @@ def constants(system: WiringContext) -> dict[Input, Constant]:
                 by_input[instance, name] = replace(other, of_instance=True)
             elif other.rank == constant.rank and other is not constant:
                 system.report(
-                    key,
+                    given.where,
                     f"{instance}.{name} has another constant already, by inputs.{other.key[1]}",
                     "input-ambiguous",
                 )
@@ -115,8 +116,7 @@ def constants(system: WiringContext) -> dict[Input, Constant]:
 def _of_facts(system: WiringContext) -> Iterator[tuple[Input, Constant]]:
     """Yield the constants of inputs that come from facts."""
     scenario, known = system.scenario, system.inputs
-    for name, fact, raw, changed in facts_of(scenario):
-        key: KeyPath = (name,)
+    for name, fact, given in facts_of(scenario):
         takers = [
             (instance, variable)
             for instance, inputs in known.items()
@@ -124,25 +124,25 @@ def _of_facts(system: WiringContext) -> Iterator[tuple[Input, Constant]]:
             if variable in inputs
         ]
         if fact.inputs and not takers:
-            if not changed and any(system.had(known, variable, "input") for variable in fact.inputs):
+            if not given.changed and any(system.had(known, variable, "input") for variable in fact.inputs):
                 system.note(
                     "left-out-after-swap", f"{name} is left out: no instance has such an input after the swap"
                 )
             else:
-                system.report(key, f"no instance has an input {name}", "variable-unknown")
+                system.report(given.where, f"no instance has an input {name}", "variable-unknown")
         refused: dict[str, list[str]] = {}
         for instance, variable in takers:
-            value = raw
+            value = given.value
             try:
-                value = value_for(known[instance][variable], raw)
+                value = value_for(known[instance][variable], value)
             except ValueError as error:
                 refused.setdefault(str(error), []).append(f"{instance}.{variable}")
-            precedence = CHANGED_FACT if changed else FACT
-            yield (instance, variable), Constant(value, key, origin(scenario, key), False, True, precedence)
+            precedence = CHANGED_FACT if given.changed else FACT
+            yield (instance, variable), Constant(value, (name,), given, False, True, precedence)
         everywhere = [len(inputs) for inputs in refused.values()] == [len(takers)]
         for sentence, inputs in refused.items():
             for variable in inputs:
-                system.report(key, sentence if everywhere else f"{sentence}, for {variable}")
+                system.report(given.where, sentence if everywhere else f"{sentence}, for {variable}")
 
 
 Reader = Callable[[SeriesSpec, str, Variable], InputSeries]

@@ -1,15 +1,6 @@
-"""State shared by all steps of wiring: the scenario, its opened FMUs, errors and notes so far; facts.
+"""State shared by all steps of wiring: the scenario, its opened FMUs, errors and notes so far.
 
-Facts are values that reach all instances that need them:
-
-    friction: 0.65         # every parameter `base_friction` of a road, and every input `friction`,
-                           # `friction_fl` .. `friction_rr` that no wire drives
-    speed: 80 km/h         # every parameter `initial_speed`, `target_speed`
-
-In a scenario file, a value given by its own name takes precedence over a fact; as an override
-(`--set friction=0.3`), a fact takes precedence over the file, so that one override reaches all instances. To
-add a fact, add a row to `FACTS`, its name to `signal_names.FACTS`, and a key to the schema of
-scenarios. `reached` and `found_at` return what the target of an override, such as a fact, sets in a plan.
+`reached` and `found_at` return what the target of an override, such as a fact, sets in a plan.
 """
 
 from __future__ import annotations
@@ -17,48 +8,26 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 from yawbench.fmus.fmu import Fmu, Value, Variable
-from yawbench.foundation.errors import Diagnostic, Severity, WiringError
+from yawbench.foundation.errors import Diagnostic, Location, Severity, WiringError
 from yawbench.foundation.messages import fold_sentences
-from yawbench.vocabulary.wheels import WHEELS, wheels
+from yawbench.vocabulary.facts import FACTS, Fact
+from yawbench.vocabulary.wheels import WHEELS
 
-from ..plan import DEFAULT, Instance, Plan, ValueOrigin
+from ..plan import Given, Instance, Plan
 from ..scenario.loader import LoadedScenario
-from ..scenario.yaml_lines import MOST_ERRORS, Document, KeyPath
-from ..signal_names import FACTS as NAMES
+from ..scenario.yaml_lines import MOST_ERRORS, KeyPath
 from ..signal_names import OF_RUN, SignalName, Target, match, matching
 
 
-@dataclass(frozen=True)
-class Fact:
-    """Inputs and parameters that a fact sets."""
-
-    unit: str  # of measurement, of the value
-    inputs: tuple[str, ...] = ()
-    parameters: dict[str, str] = field(default_factory=dict)
-    """Parameter -> another of the same instance that disables it if 0; "" if it is always in use."""
-
-    def counts(self, instance: Instance, parameter: str) -> bool:
-        """Return whether the fact sets a parameter of an instance, and the parameter is in use."""
-        if parameter not in self.parameters:
-            return False
-        return instance.parameter(self.parameters[parameter]) != 0
-
-
-FACTS = {
-    "friction": Fact("1", ("friction", *wheels("friction_*")), {"base_friction": ""}),
-    "speed": Fact("m/s", parameters={"initial_speed": "", "target_speed": "speed_gain"}),
-}
-assert tuple(FACTS) == NAMES
-
-
-def facts_of(scenario: LoadedScenario) -> Iterator[tuple[str, Fact, Value, bool]]:
-    """Yield the facts of a scenario: name, fact, value, and whether the value is an override."""
+def facts_of(scenario: LoadedScenario) -> Iterator[tuple[str, Fact, Given[Value]]]:
+    """Yield the facts of a scenario: name, fact, value."""
     for name, fact in FACTS.items():
-        value = getattr(scenario, name)
-        if value is not None:
-            yield name, fact, value, scenario.document.override((name,)) is not None
+        given = getattr(scenario, name)
+        if given is not None:
+            yield name, fact, given
 
 
 ByUnit = dict[str, dict[str, Variable]]
@@ -79,13 +48,16 @@ class WiringContext:
     """Returns the replaced FMU of an instance, None if it does not exist."""
     notes: list[Diagnostic] = field(default_factory=list)
     """Diagnostics that are not errors, for the plan."""
-    reported: list[tuple[tuple[bool, KeyPath, str], str]] = field(default_factory=list)
-    """Errors: whether the key is in the vehicle file, the key, the code; the sentence."""
+    reported: list[tuple[tuple[Location, str], str]] = field(default_factory=list)
+    """Errors: place and code, sentence."""
 
     @cached_property
-    def origins(self) -> dict[str, dict[str, ValueOrigin]]:
-        """Instance -> parameter or constant -> where its value comes from, as far as known yet."""
-        return {instance: {} for instance in self.fmus}
+    def given(self) -> dict[str, dict[str, Given[Any]]]:
+        """Instance -> parameter or constant -> its value as given, at first the start value of the FMU."""
+        return {
+            instance: {variable.name: Given(variable.start) for variable in fmu.of("parameter")}
+            for instance, fmu in self.fmus.items()
+        }
 
     @cached_property
     def inputs(self) -> ByUnit:
@@ -134,30 +106,22 @@ class WiringContext:
         """Add a diagnostic that is not an error."""
         self.notes.append(Diagnostic(code, sentence, severity))
 
-    def report(
-        self, key: KeyPath, sentence: str, code: str = "value-invalid", document: Document | None = None
-    ) -> None:
-        """Report an error about the value at `key` of the scenario, or of the vehicle file if given.
+    def report(self, where: KeyPath | Location, sentence: str, code: str = "value-invalid") -> None:
+        """Report an error about a value: at a key of the scenario, or at a place.
 
         Raises:
             WiringError: there are too many errors to continue.
         """
-        self.reported.append(((document is self.scenario.vehicle_document, key, code), sentence))
+        where = where if isinstance(where, Location) else self.scenario.document.location(where)
+        self.reported.append(((where, code), sentence))
         if len(self.reported) >= len(WHEELS) * MOST_ERRORS:
             raise WiringError(self.errors())
 
     def errors(self) -> list[Diagnostic]:
         """Return all errors in the order of the files' lines, with those of the four wheels merged."""
-        errors: list[Diagnostic] = []
-        folded = fold_sentences(self.reported)
-        for of_vehicle, document in enumerate((self.scenario.document, self.scenario.vehicle_document)):
-            of_document = [
-                Diagnostic(code, text, location=document.location(key))
-                for (which, key, code), text in folded
-                if which == of_vehicle
-            ]
-            errors += sorted(dict.fromkeys(of_document), key=lambda error: error.location.line or 0)
-        return errors
+        errors = [Diagnostic(code, text, location=at) for (at, code), text in fold_sentences(self.reported)]
+        vehicle = self.scenario.vehicle_document.path
+        return sorted(dict.fromkeys(errors), key=lambda e: (e.location.file == vehicle, e.location.line or 0))
 
 
 def reached(plan: Plan, target: Target) -> Iterator[tuple[Instance, Variable]]:
@@ -200,7 +164,7 @@ def found_at(plan: Plan, target: Target) -> tuple[Value, str] | None:
         return float(instance.period * plan.step), "s"
     for instance, variable in reached(plan, target):
         value = {**instance.parameters, **instance.constants}.get(variable.name, variable.start)
-        of_vehicle = instance.origins.get(variable.name, DEFAULT).kind == "vehicle"
+        of_vehicle = instance.origin(variable.name).kind == "vehicle"
         if value is not None and (of_vehicle or target.kind != "vehicle_parameter"):
             return value, variable.unit or ""
     return None

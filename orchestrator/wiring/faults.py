@@ -5,16 +5,16 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from yawbench.fmus.fmu import Variable
+from yawbench.foundation.errors import Location
 from yawbench.foundation.messages import fold, hint, listed
 
 from ..fault_kinds import KINDS, Fault, FaultLocation, FaultySignal
-from ..plan import Wire
-from ..scenario.loader import LoadedScenario
+from ..plan import Given, Wire
+from ..scenario.fault_schema import FaultSpec
 from ..scenario.quantities import convert
-from ..scenario.yaml_lines import KeyPath, dotted
 from ..signal_names import match, matching
 from .context import WiringContext
 
@@ -26,14 +26,14 @@ def faults_of(
     scenario = system.scenario
     signals: list[FaultySignal] = []
     record = set(record)
-    for i, fault in enumerate(spec.fault for spec in scenario.faults):
-        key: KeyPath = ("faults", i)
-        at = _Finder(system, wires, record, key).at(fault)
+    for given in scenario.faults:
+        fault = given.value.fault
+        at = _Finder(system, wires, record, given).at(fault)
         for instance, name, of_output in at:
             variable = system.fmus[instance].variables[name]
             if variable.type != "Real":
                 system.report(
-                    (*key, "on"),
+                    _part(given, "on"),
                     f"{instance}.{name} is {variable.type}: faults are for Real",
                     "fault-invalid",
                 )
@@ -41,7 +41,7 @@ def faults_of(
             try:
                 value = _value(fault, variable)
             except ValueError as error:
-                system.report((*key, "value"), f"{instance}.{name}: {error}", "fault-invalid")
+                system.report(_part(given, "value"), f"{instance}.{name}: {error}", "fault-invalid")
                 continue
             before = sum(
                 (f.instance, f.variable, f.of_output) == (instance, name, of_output) for f in signals
@@ -52,7 +52,7 @@ def faults_of(
             signals.append(FaultySignal(fault, instance, name, of_output, value, stream if drawn else 0))
         if at and fault.begin >= scenario.stop_time:
             ends = f"the run ends at {float(scenario.stop_time):g} s"
-            sentence = f"{_said(scenario, key)} never acts: it begins at {fault.begin:g} s, {ends}"
+            sentence = f"{_said(given)} never acts: it begins at {fault.begin:g} s, {ends}"
             system.note("fault-never-acts", sentence)
     return tuple(signals)
 
@@ -83,9 +83,13 @@ def _value(fault: Fault, variable: Variable) -> float | None:
     return value
 
 
-def _said(scenario: LoadedScenario, key: KeyPath) -> str:
-    change = scenario.document.override(key)
-    return str(change) if change else f"{dotted(key)} ({scenario.faults[key[1]].on})"  # type: ignore[index]
+def _said(given: Given[FaultSpec]) -> str:
+    return given.where.target if given.changed else f"{given.where.target} ({given.value.on})"
+
+
+def _part(given: Given[FaultSpec], name: str) -> Location:
+    """Return the place of an option of a fault."""
+    return given.where if given.changed else replace(given.where, target=f"{given.where.target}.{name}")
 
 
 @dataclass
@@ -95,7 +99,7 @@ class _Finder:
     system: WiringContext
     wires: Sequence[Wire]
     record: set[tuple[str, str]]
-    key: KeyPath
+    given: Given[FaultSpec]
 
     def at(self, fault: Fault) -> list[tuple[str, str, bool]]:
         """Return (instance, variable, whether it is an output) of everything that the fault acts on."""
@@ -166,8 +170,8 @@ class _Finder:
         self._report(f"{instance} has neither an output nor an input {pattern!r}{guess}", "variable-unknown")
 
     def _left_out(self) -> None:
-        fault = _said(self.system.scenario, self.key)
+        fault = _said(self.given)
         self.system.note("left-out-after-swap", f"{fault} is left out: there is no such signal any more")
 
     def _report(self, sentence: str, code: str) -> None:
-        self.system.report((*self.key, "on"), sentence, code)
+        self.system.report(_part(self.given, "on"), sentence, code)

@@ -37,13 +37,11 @@ from yawbench.foundation.errors import (
     Location,
     ModelDescriptionError,
     WiringError,
-    YawbenchError,
 )
 from yawbench.foundation.messages import closest, fold, hint, listed
 from yawbench.vocabulary.roles import role_in, role_of
-from yawbench.vocabulary.wheels import WHEELS
 
-from ..plan import DEFAULT, InputSeries, Instance, Plan, ValueOrigin, Wire
+from ..plan import Given, InputSeries, Instance, Plan, Wire
 from ..scenario.loader import LoadedScenario
 from ..signal_names import SignalName, match
 from .connections import Connector
@@ -52,8 +50,7 @@ from .context import WiringContext
 from .control_side import exact
 from .faults import faults_of
 from .order import EvaluationOrder, evaluate
-from .parameters import STATIC_LOADS, STIFFNESSES, Parameters
-from .suspicious_values import suspicious_values
+from .parameters import Domain
 
 
 def missing_functions(
@@ -132,12 +129,7 @@ def _matching(
     ]
 
 
-TYRE_FORCES = tuple(f"tyre_force_y_{wheel}" for wheel in WHEELS)
-"""Outputs that identify an instance as tyres."""
-TyreMeasurement = Callable[[Instance, Mapping[str, float]], Mapping[str, float]]
-"""Callback: (instance of tyres, wheel -> load [N]) -> wheel -> cornering stiffness of one tyre [N/rad]."""
-
-
+NOTHING = Domain()
 NETWORKS = 100
 """Largest number of networks that are kept. Chosen: more than a study has, little memory."""
 
@@ -199,12 +191,12 @@ def _values(
     for (instance, name), constant in by_input.items():
         if (instance, name) not in wired:
             values[instance][name] = constant.value
-            system.origins[instance][name] = constant.origin
+            system.given[instance][name] = constant.given
     for instance, name in network.kept:
         start = system.inputs[instance][name].start
         assert start is not None  # else it would have been reported
         values[instance][name] = start
-        system.origins[instance][name] = DEFAULT
+        system.given[instance][name] = Given(start)
     return values
 
 
@@ -214,7 +206,7 @@ def make_plan(
     fmus: Path | None = None,
     opener: Opener | None = None,
     isolated: bool = False,
-    measure: TyreMeasurement | None = None,
+    domain: Domain = NOTHING,
     networks: dict[Hashable, Network] | None = None,
 ) -> Plan:
     """Open the scenario's FMUs and connect them.
@@ -224,8 +216,7 @@ def make_plan(
         fmus: folder of the FMUs given by name; None: the nearest `fmus/` that contains any.
         opener: opens the FMUs; default: an opener that builds nothing.
         isolated: whether each instance will run in its own process (see `master.isolation`).
-        measure: measures the cornering stiffness of tyres, for instances that need it if the vehicle file
-            does not give it (see `tyre_stand.cornering_stiffness`).
+        domain: what is known of the things that the scenario is about.
         networks: those of earlier plans, to be used again; this plan's is added.
 
     Raises:
@@ -236,7 +227,7 @@ def make_plan(
     system = _open_all(scenario, fmus, opener or Opener())
     opened, notes = system.fmus, system.notes
     notes += [*scenario.document.notes, *stale_fmus(opened.values()), *host_needs(opened.values())]
-    distributed = Parameters(system)
+    distributed = domain.parameters(system)
     parameters = distributed.of_instances()
     by_input = constants(system)
     network = _network(system, by_input, isolated, {} if networks is None else networks)
@@ -251,7 +242,7 @@ def make_plan(
     if not errors and not of_all:  # all variables are known
         of_all = missing_functions(instances.values(), wires, record)
     if not errors and not of_all:
-        errors += _take_from_tyres(scenario, instances, distributed, measure)
+        errors += distributed.complete(instances)
     errors += [replace(error, location=Location(file=scenario.path)) for error in of_all]
     if errors:
         raise WiringError([*_misplaced(scenario), *errors])
@@ -275,7 +266,7 @@ def make_plan(
         title=scenario.title,
         scenario=scenario.as_run(),
         changes=scenario.changes,
-        diagnostics=(*notes, *suspicious_values(scenario, instances)),
+        diagnostics=(*notes, *domain.warnings(scenario, instances)),
         faults=faults,
     )
 
@@ -295,44 +286,6 @@ def _errors_of_network(network: Network) -> list[Diagnostic]:
     return errors
 
 
-def _take_from_tyres(
-    scenario: LoadedScenario,
-    instances: dict[str, Instance],
-    distributed: Parameters,
-    measure: TyreMeasurement | None,
-) -> list[Diagnostic]:
-    """Set missing cornering stiffnesses of axles to those of the tyres at static loads; return errors."""
-    if not distributed.lacking:
-        return []
-    loads = [distributed.car.values[name] for name in STATIC_LOADS]
-    tyres = [u for u in instances.values() if {v.name for v in u.fmu.of("output")} >= {*TYRE_FORCES}]
-    try:
-        if len(tyres) != 1 or measure is None:
-            raise ValueError("this needs exactly one instance that computes the tyre forces")
-        measured = measure(tyres[0], dict(zip(WHEELS[::2], loads, strict=True)))
-    except (ValueError, YawbenchError) as error:
-        return [
-            Diagnostic(
-                "vehicle-incomplete",
-                f"the vehicle file does not give {listed(names)}, and measuring the tyres failed: {error}",
-                location=scenario.document.location(("units", instance)),
-            )
-            for instance, names in distributed.lacking.items()
-        ]
-    stiffness = dict(zip(STIFFNESSES, (2.0 * measured[wheel] for wheel in WHEELS[::2]), strict=True))
-    for instance, names in distributed.lacking.items():
-        formula = {
-            name: ValueOrigin.derived(f"two of {tyres[0].fmu.name} at {load:.6g} N each")
-            for name, load in zip(STIFFNESSES, loads, strict=True)
-        }
-        instances[instance] = replace(
-            instances[instance],
-            parameters=instances[instance].parameters | {name: stiffness[name] for name in names},
-            origins=instances[instance].origins | {name: formula[name] for name in names},
-        )
-    return []
-
-
 def _instance(
     system: WiringContext, name: str, parameters: dict[str, Value], inputs: Mapping[str, Value | InputSeries]
 ) -> Instance:
@@ -348,7 +301,7 @@ def _instance(
         period=int((spec.step_size or step) / step),
         parameters=parameters,
         constants={key: v.first(start) if isinstance(v, InputSeries) else v for key, v in inputs.items()},
-        origins=system.origins[name],
+        given=system.given[name],
         tolerance=spec.tolerance,
         series={key: v for key, v in inputs.items() if isinstance(v, InputSeries)},
     )

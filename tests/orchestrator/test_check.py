@@ -182,9 +182,8 @@ def test_every_problem_is_a_line_on_stderr_and_the_status_is_2(
 
 def test_checking_loads_no_simulation_and_no_figures() -> None:
     code = (
-        "import sys; from yawbench.orchestrator.scenario.loader import load_scenario\n"
-        "from yawbench.orchestrator.wiring.make_plan import make_plan\n"
-        "make_plan(load_scenario('Läufe 2/a.yaml'))\n"
+        "import sys; from pathlib import Path; from yawbench.planner import Planner\n"
+        "planner = Planner(); planner.plan(planner.load(Path('Läufe 2/a.yaml')))\n"
         "print(sorted({'fmpy', 'numpy', 'lxml', 'matplotlib', 'rich', 'components'} & set(sys.modules)))"
     )
     assert check("Läufe 2/a.yaml") == 0  # fills the cache

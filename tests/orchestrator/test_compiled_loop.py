@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 import yawbench as yb
+from tests.cars import load_scenario, make_plan
 from tests.refusals import mentions, refused
 from yawbench.cli import main
 from yawbench.fmus.build import build_component
@@ -24,8 +25,7 @@ from yawbench.orchestrator.master import compiled_loop
 from yawbench.orchestrator.master.simulate import simulate
 from yawbench.orchestrator.master.step_loop import RunPosition
 from yawbench.orchestrator.results.reader import load_results
-from yawbench.orchestrator.scenario.loader import load_scenario, names
-from yawbench.orchestrator.wiring.make_plan import make_plan
+from yawbench.orchestrator.scenario.loader import names
 
 from . import models3
 from .conftest import compiled

@@ -155,12 +155,12 @@ def test_a_fault_that_cannot_be_is_one_sentence(fault, names, folder):
     assert mentions(str(problem), *names)
 
 
-def test_a_fault_of_a_file_is_told_with_its_line_also_after_an_option_has_moved_it(folder):
+def test_a_fault_of_a_file_is_told_with_its_place_also_after_an_option_has_removed_another(folder):
     text = SCENARIO + "faults:\n  - {on: gyro.yaw_rate, kind: freeze}\n  - {on: plant.yaw_rate, kind: gain}\n"
     with pytest.raises(ScenarioError) as caught:
         planned("gyro.yaw_rate: none", text=text)
     assert caught.value.code == "value-invalid"
-    assert each_mentions([str(p) for p in texts_of(caught.value)], ("a.yaml:13", "faults[0]"))
+    assert each_mentions([str(p) for p in texts_of(caught.value)], ("a.yaml:13", "faults[1]"))
 
 
 def test_what_a_fault_never_reaches_is_noted(folder):

@@ -9,13 +9,12 @@ from pathlib import Path
 
 import pytest
 
+from tests.cars import load_scenario, make_plan
 from tests.changed import changed
 from yawbench.cli import main
 from yawbench.fmus.description import binary_of
 from yawbench.foundation.errors import Diagnostic
 from yawbench.orchestrator.results.reader import load_results
-from yawbench.orchestrator.scenario.loader import load_scenario
-from yawbench.orchestrator.wiring.make_plan import make_plan
 
 from .conftest import compiled
 from .fake_fmus import make_fmu, model_description

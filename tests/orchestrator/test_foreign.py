@@ -9,14 +9,13 @@ from pathlib import Path
 import fmpy
 import pytest
 
+from tests.cars import load_scenario, make_plan
 from tests.refusals import mentions
 from yawbench.cli import main
 from yawbench.metrics.expressions import evaluate, metric
 from yawbench.orchestrator.master import child_run
 from yawbench.orchestrator.results.freshness import staleness
 from yawbench.orchestrator.results.reader import load_results
-from yawbench.orchestrator.scenario.loader import load_scenario
-from yawbench.orchestrator.wiring.make_plan import make_plan
 
 HERE = Path(__file__).parent
 INPUT, OUTPUT, ANSWER = 1000001, 4000000000, 7

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.cars import load_scenario, make_plan
 from tests.pages.made_up import unpacked
 from tests.refusals import each_mentions, mentions, places_of, refused, texts_of
 from yawbench.cli import main
@@ -18,9 +19,7 @@ from yawbench.fmus import zip_members
 from yawbench.foundation.errors import Diagnostic, ScenarioError, YawbenchError
 from yawbench.foundation.safe_files import reading
 from yawbench.orchestrator.scenario import yaml_lines
-from yawbench.orchestrator.scenario.loader import load_scenario
 from yawbench.orchestrator.scenario.overrides import read_changes
-from yawbench.orchestrator.wiring.make_plan import make_plan
 from yawbench.reports.page_parts import render
 from yawbench.reports.study_page import chapter
 from yawbench.studies.experiment import LoadedExperiment

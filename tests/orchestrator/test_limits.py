@@ -12,11 +12,10 @@ from typing import Any
 import pytest
 
 from campaigns.large import write_ring
+from tests.cars import load_scenario, make_plan
 from tests.refusals import mentions, texts_of
 from yawbench.commands.check import show
 from yawbench.foundation.errors import WiringError
-from yawbench.orchestrator.scenario.loader import load_scenario
-from yawbench.orchestrator.wiring.make_plan import make_plan
 
 pytestmark = pytest.mark.usefixtures("common_cache")
 

@@ -7,13 +7,12 @@ from pathlib import Path
 
 import pytest
 
+from tests.cars import load_scenario, make_plan
 from tests.commands import status_of
 from tests.refusals import mentions
 from yawbench.cli import main
 from yawbench.foundation.errors import ScenarioError, WiringError
-from yawbench.orchestrator.scenario.loader import load_scenario
 from yawbench.orchestrator.scenario.quantities import exact_text, seconds
-from yawbench.orchestrator.wiring.make_plan import make_plan
 from yawbench.studies.load_experiment import load_experiment
 
 from .fake_fmus import Var, make_fmu, out

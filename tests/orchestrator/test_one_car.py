@@ -7,15 +7,14 @@ from pathlib import Path
 import pytest
 from ruamel.yaml import YAML
 
+from tests.cars import load_scenario, make_plan
 from tests.changed import changed
 from tests.refusals import each_mentions, mentions, refused, texts_of
 from yawbench.commands.check import show
 from yawbench.components.cars.sprung_car import FourteenDofParameters, ride_of
 from yawbench.foundation.errors import WiringError
 from yawbench.orchestrator.plan import ValueOrigin
-from yawbench.orchestrator.scenario.loader import load_scenario
-from yawbench.orchestrator.wiring.derivations import DERIVATIONS, adapted, car_of, contradictions
-from yawbench.orchestrator.wiring.make_plan import make_plan
+from yawbench.vehicles.derivations import DERIVATIONS, adapted, car_of, contradictions
 from yawbench.vocabulary.gravity import G
 
 from .fake_fmus import Var, make_fmu, out
@@ -154,7 +153,7 @@ def unit(plan, name):
 def test_a_unit_takes_what_it_declares_and_what_follows(plan):
     plant = unit(plan(), "plant")
     assert plant.parameters == {"mass": 1830.0, "cg_to_rear_axle": pytest.approx(1.65)}
-    assert {name: str(origin) for name, origin in plant.origins.items()} == {
+    assert {name: str(given.origin) for name, given in plant.given.items()} == {
         "mass": "derived: sprung_mass + unsprung_mass",
         "cg_to_rear_axle": "derived: wheelbase - cg_to_front_axle",
     }
@@ -218,7 +217,7 @@ def test_a_reference_is_told_what_the_tyres_have_at_their_static_loads(plan):
     load = 0.5 * 1830.0 * G * 1.65 / 3.05
     assert asked == {"fl": pytest.approx(load), "rl": pytest.approx(0.5 * 1830.0 * G - load)}
     formula = f"two of tyre_x at {load:.6g} N each"
-    assert reference.origins["cornering_stiffness_front"] == ValueOrigin("derived", formula)
+    assert reference.origin("cornering_stiffness_front") == ValueOrigin("derived", formula)
 
 
 def test_a_reference_without_tyres_to_ask_is_refused(plan):

@@ -7,14 +7,13 @@ from pathlib import Path
 import pytest
 import yaml
 
+from tests.cars import load_scenario, make_plan
 from tests.changed import changed
 from tests.commands import status_of
 from tests.refusals import mentions
 from yawbench.foundation.errors import warnings_in
-from yawbench.orchestrator.scenario.loader import load_scenario
-from yawbench.orchestrator.wiring.make_plan import make_plan
-from yawbench.orchestrator.wiring.parameters import known_car
-from yawbench.orchestrator.wiring.suspicious_values import suspicious_vehicle
+from yawbench.vehicles.derivations import known_car
+from yawbench.vehicles.suspicious_values import suspicious_vehicle
 from yawbench.vocabulary.vehicle import CAR
 
 from .fake_fmus import Var, make_fmu, out

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.cars import load_scenario, make_plan
 from tests.fmu_copies import put_fmus
 from tests.refusals import each_mentions, mentions
 from yawbench.cli import main
@@ -19,8 +20,6 @@ from yawbench.orchestrator.master import log
 from yawbench.orchestrator.master.fmi import open_instance
 from yawbench.orchestrator.master.simulate import simulate
 from yawbench.orchestrator.results.reader import load_results
-from yawbench.orchestrator.scenario.loader import load_scenario
-from yawbench.orchestrator.wiring.make_plan import make_plan
 
 UNITS = (
     "driver_sine", "reference_steady_state", "controller_fnn", "controller_off",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ import pytest
 from tests.changed import changed
 from tests.refusals import each_mentions, mentions, places_of
 from yawbench.foundation.errors import Diagnostic, ScenarioError
+from yawbench.orchestrator.plan import Given, ValueSource
 from yawbench.orchestrator.scenario.loader import load_scenario
 from yawbench.orchestrator.signal_names import SignalName
 
@@ -54,6 +56,10 @@ def edited(*replacements: tuple[str, str]) -> Path:
     return write(text)
 
 
+def values_in(given: Mapping[str, Given[Any]]) -> dict[str, Any]:
+    return {name: each.value for name, each in given.items()}
+
+
 def problems(path: Path, **options: Any) -> list[Diagnostic]:
     with pytest.raises(ScenarioError) as caught:
         load_scenario(path, changes=changed(**options))
@@ -67,9 +73,9 @@ def test_everything_in_the_file_is_read(file: Path) -> None:
     assert scenario.title == "Single sine"
     assert (scenario.stop_time, scenario.step_size) == (Fraction(8), Fraction(1, 1000))
     assert scenario.algorithm == "extrapolated"
-    assert scenario.inputs == {"friction*": 0.65}
+    assert values_in(scenario.inputs) == {"friction*": 0.65}
     assert list(scenario.units) == ["driver", "controller", "plant"]
-    assert scenario.units["driver"].parameters == {"amplitude": "5 deg"}
+    assert values_in(scenario.units["driver"].parameters) == {"amplitude": "5 deg"}
     assert scenario.units["controller"].step_size == Fraction(1, 500)
     assert scenario.connections[0].source == SignalName("controller", "torque_request_*")
     assert scenario.connections[0].target == SignalName("plant", "wheel_torque_*")
@@ -287,7 +293,7 @@ def test_vehicle_parameters_come_from_beside_the_scenario(file: Path) -> None:
     Path("cars").mkdir()
     Path("cars/car.yaml").write_text("title: Car\nparameters: {mass: 1.1 t}\n")
     scenario = load_scenario(edited(("title:", "vehicle: cars/car.yaml\ntitle:")))
-    assert scenario.vehicle_file.parameters == {"mass": "1.1 t"}
+    assert values_in(scenario.vehicle_file.parameters) == {"mass": "1.1 t"}
 
 
 def test_mistakes_in_the_vehicle_file_name_that_file(file: Path) -> None:
@@ -342,10 +348,27 @@ def test_settings_change_parameters_constants_and_the_vehicle(file: Path) -> Non
             ]
         ),
     )
-    assert scenario.units["driver"].parameters == {"amplitude": "2 deg", "mode": "lane change"}
-    assert scenario.units["plant"].parameters == {"initial_speed": 25, "locked": True}
-    assert scenario.inputs == {"friction*": 0.65, "friction_fl": 0.3}
-    assert scenario.vehicle_file.parameters == {"mass": "1200 kg"}
+    assert values_in(scenario.units["driver"].parameters) == {"amplitude": "2 deg", "mode": "lane change"}
+    assert values_in(scenario.units["plant"].parameters) == {"initial_speed": 25, "locked": True}
+    assert values_in(scenario.inputs) == {"friction*": 0.65, "friction_fl": 0.3}
+    assert values_in(scenario.vehicle_file.parameters) == {"mass": "1200 kg"}
+
+
+def test_a_value_keeps_its_unit_origin_and_place(file: Path) -> None:
+    path = edited(("title:", "source: paper A\ntitle:"), ("5 deg}}", "5 deg}}  # chosen: small"))
+    changes = changed(settings=["driver.amplitude=0.1 rad", "inputs.friction*=0.3"])
+    of_file = load_scenario(path).units["driver"].parameters["amplitude"]
+    of_option = load_scenario(path, changes=changes).units["driver"].parameters["amplitude"]
+    assert (of_file.value, of_file.unit, of_file.changed) == ("5 deg", "deg", False)
+    assert (of_file.origin.kind, str(of_file.where)) == (
+        "scenario",
+        "a.yaml:7: units.driver.parameters.amplitude",
+    )
+    assert of_file.origin.source == ValueSource("chosen", "chosen: small", "a.yaml", 7)
+    assert (of_option.value, of_option.unit, of_option.changed) == ("0.1 rad", "rad", True)
+    assert (of_option.origin.kind, str(of_option.where)) == ("--set", "--set driver.amplitude=0.1 rad")
+    assert of_option.replaces == of_file
+    assert load_scenario(path, changes=changes).inputs["friction*"].unit == ""
 
 
 def test_settings_change_times_and_algorithm_of_the_run_and_steps_of_units(file: Path) -> None:
@@ -425,7 +448,10 @@ def test_a_wrong_option_is_named(
     file: Path, options: dict[str, Any], expected: list[tuple[str, str]] | None, names
 ) -> None:
     if expected is None:
-        assert load_scenario(file, changes=changed(**options)).units["driver"].parameters["amplitude"] == ""
+        assert (
+            load_scenario(file, changes=changed(**options)).units["driver"].parameters["amplitude"].value
+            == ""
+        )
     else:
         found = problems(file, **options)
         assert places_of(found) == expected

@@ -13,15 +13,15 @@ import fmpy.ssp
 import pytest
 from lxml import etree
 
+from tests.cars import load_scenario, make_plan
 from tests.changed import changed
 from tests.refusals import mentions, texts_of
 from yawbench.cli import main
 from yawbench.foundation.errors import ResultsError, YawbenchError
 from yawbench.interop.ssp_write import for_omsimulator, write_ssp
 from yawbench.orchestrator.master.simulate import simulate
-from yawbench.orchestrator.scenario.loader import files, load_scenario
+from yawbench.orchestrator.scenario.loader import files
 from yawbench.orchestrator.scenario.ssp_archive import DESCRIPTION_FILE, SSC, SSD, SSM, SSV
-from yawbench.orchestrator.wiring.make_plan import make_plan
 
 from .fake_fmus import make_fmu
 

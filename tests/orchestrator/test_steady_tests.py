@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 import yawbench as yb
+from tests.cars import load_scenario, make_plan
 from tests.refusals import each_mentions, mentions
 from yawbench.components.drivers.sine_sweep import SineSweepParameters, sweep
 from yawbench.metrics.verdict import Status, Verdict
 from yawbench.orchestrator.results.reader import Results
 from yawbench.orchestrator.results.run_record import RunRecord
-from yawbench.orchestrator.scenario.loader import SHIPPED, load_scenario
-from yawbench.orchestrator.wiring.make_plan import make_plan
+from yawbench.orchestrator.scenario.loader import SHIPPED
 from yawbench.proving_ground.braking_and_wind import evaluate_turn
 from yawbench.proving_ground.standard_tests import Evaluation
 from yawbench.proving_ground.steering_tests import (

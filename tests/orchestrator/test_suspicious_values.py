@@ -6,12 +6,11 @@ from pathlib import Path
 
 import pytest
 
+from tests.cars import load_scenario, make_plan
 from tests.changed import changed
 from tests.refusals import each_mentions, mentions, refused
 from yawbench.foundation.errors import WiringError, warnings_in
-from yawbench.orchestrator.scenario.loader import load_scenario
 from yawbench.orchestrator.wiring.control_side import seen_as
-from yawbench.orchestrator.wiring.make_plan import make_plan
 from yawbench.vocabulary.wheels import WHEELS
 
 from .fake_fmus import Var, make_fmu, out

@@ -12,7 +12,7 @@ import pytest
 from tests.refusals import mentions, refused, texts_of
 from yawbench.components.tyre_models.pacejka_2012_set import COMMON, LONGITUDINAL, REST
 from yawbench.foundation.errors import ScenarioError
-from yawbench.orchestrator.scenario.tir import read_tir
+from yawbench.vehicles.tir import read_tir
 
 from .tir_files import UNITS, text_of, write
 

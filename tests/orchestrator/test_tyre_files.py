@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.cars import load_scenario, make_plan
 from tests.changed import changed
 from tests.refusals import mentions, refused, texts_of
 from yawbench.cli import main
@@ -19,10 +20,8 @@ from yawbench.orchestrator.results.folder_names import default_folder
 from yawbench.orchestrator.results.freshness import key_of
 from yawbench.orchestrator.results.reader import load_results
 from yawbench.orchestrator.results.record_of_plan import run_record
-from yawbench.orchestrator.scenario.loader import load_scenario
 from yawbench.orchestrator.scenario.overrides import changes_of, read_changes
 from yawbench.orchestrator.signal_names import Target
-from yawbench.orchestrator.wiring.make_plan import make_plan
 from yawbench.reports.provenance import groups_of
 from yawbench.studies.experiment import plan_experiment
 from yawbench.studies.load_experiment import load_experiment
@@ -87,11 +86,8 @@ def test_every_unit_takes_what_it_declares_for_both_axles(folder, fmus):
     assert (control["pkx1_front"], control["pkx1_rear"]) == (18.0, 25.0)
     assert "pky1_front" not in control
     assert not set(parameters(planned, "plant")) & set(tyre)
-    origins = {u.name: u.origins for u in planned.instances}
-    assert (str(origins["tyre"]["pky1_front"]), str(origins["tyre"]["pky1_rear"])) == (
-        "soft.tir",
-        "stiff.tir",
-    )
+    tyres = next(u for u in planned.instances if u.name == "tyre")
+    assert [str(tyres.origin(name)) for name in ("pky1_front", "pky1_rear")] == ["soft.tir", "stiff.tir"]
     assert not any("tyre" in note or "radius" in note for note in texts_of(planned))
 
 

@@ -9,8 +9,8 @@ from tests.commands import status_of
 from tests.components.stand import Stand as Bench
 from tests.refusals import each_mentions, mentions
 from yawbench.components.tyres.magic_formula_62 import MagicFormula62
-from yawbench.orchestrator.scenario.tir import read_tir
 from yawbench.tyre_stand import WheelState, draw_tyre, put_on_stand, stiffnesses
+from yawbench.vehicles.tir import read_tir
 
 from .tir_files import write
 

@@ -9,13 +9,12 @@ from typing import Any
 
 import pytest
 
+from tests.cars import load_scenario, make_plan
 from tests.changed import changed
 from tests.refusals import each_mentions, mentions, places_of, texts_of
 from yawbench.fmus import opener
 from yawbench.foundation.errors import Diagnostic, Location, ModelDescriptionError, WiringError, YawbenchError
 from yawbench.orchestrator.plan import Instance, Override, Plan, ValueOrigin, Wire
-from yawbench.orchestrator.scenario.loader import load_scenario
-from yawbench.orchestrator.wiring.make_plan import make_plan
 from yawbench.planner import Planner
 from yawbench.vocabulary.wheels import WHEELS
 
@@ -1098,11 +1097,11 @@ def test_every_value_says_where_it_comes_from(folder: Path) -> None:
     units = UNITS.replace("driver_sine}", "driver_sine, parameters: {amplitude: 0.05}}")
     path = scenario(units, head="vehicle: car.yaml\n")
     made = plan(path, settings=["inputs.friction_fl=0.3"])
-    assert unit(made, "plant").origins["mass"].kind == "vehicle"
-    assert unit(made, "driver").origins["amplitude"].kind == "scenario"
-    assert unit(made, "driver").origins["road"].kind == "default"
-    assert unit(made, "tyre").origins["friction_fl"].kind == "--set"
-    assert unit(made, "tyre").origins["friction_rr"].kind == "scenario"
+    assert unit(made, "plant").origin("mass").kind == "vehicle"
+    assert unit(made, "driver").origin("amplitude").kind == "scenario"
+    assert unit(made, "driver").origin("road").kind == "default"
+    assert unit(made, "tyre").origin("friction_fl").kind == "--set"
+    assert unit(made, "tyre").origin("friction_rr").kind == "scenario"
 
 
 def test_a_plan_names_what_is_other_than_in_the_scenario_file() -> None:
@@ -1116,7 +1115,7 @@ def test_a_plan_names_what_is_other_than_in_the_scenario_file() -> None:
 def test_a_change_that_changes_nothing_is_none() -> None:
     made = plan(swaps=["controller=controller_fnn"], settings=["inputs.friction*=0.65", "stop_time=8.0"])
     assert made.changes == ()
-    assert unit(made, "tyre").origins["friction_fl"].kind == "--set"
+    assert unit(made, "tyre").origin("friction_fl").kind == "--set"
 
 
 def test_any_variable_is_recorded_by_its_name_and_patterns_mean_outputs_first() -> None:
@@ -1184,7 +1183,7 @@ def test_a_parameter_that_is_text_can_come_from_a_file(folder):
 
     made = unit(plan(with_road("patches: {file: sub/patches.txt}")), "road")
     assert made.parameters["patches"] == "y > 0\nx < 5 # Größe\n"
-    assert made.origins["patches"] == ValueOrigin("file", "sub/patches.txt")
+    assert made.origin("patches") == ValueOrigin("file", "sub/patches.txt")
     for given, code, names in (
         ("patches: {file: none.txt}", "file-unreadable", ("none.txt",)),
         ("patches: {file: sub}", "file-unreadable", ("sub", "directory")),

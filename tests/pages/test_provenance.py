@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.cars import load_scenario, make_plan
 from tests.changed import changed
 from tests.fmu_copies import put_fmus
 from tests.orchestrator.recorded import record_text
@@ -16,8 +17,6 @@ from yawbench.orchestrator.plan import CHOSEN, ERRATUM, LITERATURE, NEUTRAL, PAP
 from yawbench.orchestrator.results.freshness import key_of, staleness
 from yawbench.orchestrator.results.record_of_plan import run_record
 from yawbench.orchestrator.results.run_record import RunRecord
-from yawbench.orchestrator.scenario.loader import load_scenario
-from yawbench.orchestrator.wiring.make_plan import make_plan
 from yawbench.reports.provenance import groups_of
 
 NOW = datetime.now(timezone.utc)

@@ -8,14 +8,13 @@ from functools import cache
 import numpy as np
 import pytest
 
+from tests.cars import load_scenario, make_plan
 from tests.changed import changed
 from tests.components import monolith
 from tests.evidence import measured
 from tests.fmu_copies import put_fmus
 from yawbench.orchestrator.master.simulate import simulate
 from yawbench.orchestrator.results.reader import load_results
-from yawbench.orchestrator.scenario.loader import load_scenario
-from yawbench.orchestrator.wiring.make_plan import make_plan
 
 OPEN_LOOP = """
 title: Open-loop sine, no control

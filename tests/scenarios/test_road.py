@@ -8,12 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.cars import load_scenario, make_plan
 from tests.changed import changed
 from tests.fmu_copies import put_fmus
 from yawbench.orchestrator.master.simulate import simulate_in_memory
 from yawbench.orchestrator.results.reader import found_runs, load_results
-from yawbench.orchestrator.scenario.loader import load_scenario
-from yawbench.orchestrator.wiring.make_plan import make_plan
 from yawbench.studies.listings import runs_table
 
 FOLDER = Path(__file__).parents[2] / "scenarios" / "road"

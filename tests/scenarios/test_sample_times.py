@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from tests.cars import load_scenario
 from tests.components.test_conformance import COMPONENTS
-from yawbench.orchestrator.scenario.loader import SHIPPED, files, load_scenario
+from yawbench.orchestrator.scenario.loader import SHIPPED, files
 
 SCENARIOS = [path for path, _ in files(SHIPPED, ["a scenario"])]
 

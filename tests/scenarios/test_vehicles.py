@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from ruamel.yaml import YAML
 
+from tests.cars import load_scenario, make_plan
 from tests.changed import changed
 from tests.components.magic import forces_and_moment
 from tests.fmu_copies import put_fmus
@@ -20,9 +21,6 @@ from yawbench.components.tyre_models.pacejka_2002_set import MagicFormulaParamet
 from yawbench.foundation.errors import WiringError, warnings_in
 from yawbench.orchestrator.master.simulate import simulate_in_memory
 from yawbench.orchestrator.scenario import yaml_lines
-from yawbench.orchestrator.scenario.loader import load_scenario
-from yawbench.orchestrator.wiring.derivations import car_of
-from yawbench.orchestrator.wiring.make_plan import make_plan
 from yawbench.planner import Planner
 from yawbench.proving_ground import handling
 from yawbench.proving_ground.handling import (
@@ -38,6 +36,7 @@ from yawbench.proving_ground.handling import (
     plants_in,
 )
 from yawbench.tyre_stand import cornering_stiffness
+from yawbench.vehicles.derivations import car_of
 from yawbench.vocabulary.vehicle import CAR
 
 FOLDER = Path(__file__).parents[2] / "scenarios" / "vehicles"

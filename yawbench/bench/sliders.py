@@ -34,13 +34,14 @@ from yawbench.orchestrator.scenario.overrides import read_changes
 from yawbench.orchestrator.scenario.quantities import convert
 from yawbench.orchestrator.scenario.schema import LoadedScenario
 from yawbench.orchestrator.signal_names import Target
-from yawbench.orchestrator.wiring.context import FACTS, facts_of, reached
+from yawbench.orchestrator.wiring.context import facts_of, reached
 from yawbench.orchestrator.wiring.parameters import value_for
 from yawbench.planner import Planner
 from yawbench.reports.page_parts import Page, render
 from yawbench.reports.viewer import Settings, assets, viewer
 from yawbench.reports.viewer_data import PackedRun, pack
 from yawbench.studies.jobs import LASTING, NEEDED, Job, execute, keyed, planned, recorded
+from yawbench.vocabulary.facts import FACTS
 from yawbench.vocabulary.vehicle import CAR
 
 KEPT = 24
@@ -101,7 +102,7 @@ def knobs_of(scenario: LoadedScenario, plan: Plan) -> list[Knob]:
             own = variable.name in scenario.units[instance.name].parameters
             target = f"{instance.name}.{variable.name}"
             if variable.name in CAR and of_file is not None and not own:
-                target, value = f"vehicle.{variable.name}", float(value_for(variable, of_file))
+                target, value = f"vehicle.{variable.name}", float(value_for(variable, of_file.value))
             if any(
                 knob.target in FACTS and variable.name in FACTS[knob.target].parameters
                 for knob in knobs.values()
@@ -112,9 +113,9 @@ def knobs_of(scenario: LoadedScenario, plan: Plan) -> list[Knob]:
 
 
 def _facts(scenario: LoadedScenario, plan: Plan) -> Iterator[Knob]:
-    for name, fact, raw, _ in facts_of(scenario):
+    for name, fact, given in facts_of(scenario):
         if any(True for _ in reached(plan, Target("fact", variable=name))):
-            value = float(convert(raw, fact.unit) if isinstance(raw, str) else raw)
+            value = float(convert(given.value, fact.unit) if isinstance(given.value, str) else given.value)
             low, high = FACT_RANGES[name]
             unit = "" if fact.unit == "1" else fact.unit
             yield Knob(name, unit, value, min(low, value), max(high, value), f"{name} for all instances")
@@ -142,8 +143,8 @@ def shown_first(knobs: Sequence[Knob], plan: Plan) -> list[str]:
         f"{instance.name}.{name}"
         for instance in plan.instances
         if instance.role == "driver"
-        for name, origin in instance.origins.items()
-        if origin.kind == "scenario"
+        for name, given in instance.given.items()
+        if given.origin.kind == "scenario"
     }
     wanted = (
         *FACTS,

@@ -155,7 +155,7 @@ def _values(plan: Plan, defaults: bool) -> tuple[Sequence[Sequence[str]], int]:
         constants = {name: value for name, value in instance.constants.items() if name not in instance.series}
         shown: list[tuple[tuple[str, str], str]] = []
         for name, value in {**own, **constants}.items():
-            source = instance.origins.get(name, DEFAULT)
+            source = instance.origin(name)
             matters = _matters(instance, name) or (
                 instance.name in cambered and name.startswith("roll_camber")
             )
@@ -171,7 +171,7 @@ def _values(plan: Plan, defaults: bool) -> tuple[Sequence[Sequence[str]], int]:
                     sources.setdefault((name, text, origin), instance.fmu.variables[name].source)
     rows: list[tuple[str, str, str, str]] = [*_run_rows(plan)]
     for axle, origin_of_file in of_tyres.items():
-        takes = [instance.name for instance in plan.instances if origin_of_file in instance.origins.values()]
+        takes = [u.name for u in plan.instances if any(g.origin == origin_of_file for g in u.given.values())]
         what = f"{files[axle]['kind']}, {files[axle]['side']}"
         rows.append((f"tyres, {axle}", what, str(origin_of_file), ", ".join(takes)))
     for key, instances in _grouped(takers).items():
@@ -180,7 +180,7 @@ def _values(plan: Plan, defaults: bool) -> tuple[Sequence[Sequence[str]], int]:
         for name, series in instance.series.items():
             how = "held" if series.held else "linear"
             rows.append(
-                (name, f"{series.file}: {series.column}, {how}", str(instance.origins[name]), instance.name)
+                (name, f"{series.file}: {series.column}, {how}", str(instance.origin(name)), instance.name)
             )
     return [(*row, sources.get(row[:3], "")) if defaults else row for row in rows], hidden
 
@@ -201,25 +201,25 @@ def _run_rows(plan: Plan) -> Iterable[tuple[str, str, str, str]]:
 def _derived(plan: Plan) -> Iterable[Sequence[str]]:
     """Return the rows of derived vehicle values, each with its formula."""
     takers = _grouped(
-        ((name, origin.detail), instance.name)
+        ((name, given.origin.detail), instance.name)
         for instance in plan.instances
-        for name, origin in instance.origins.items()
-        if origin.kind == "derived"
+        for name, given in instance.given.items()
+        if given.origin.kind == "derived"
     )
     return [(*key, ", ".join(instances)) for key, instances in takers.items()]
 
 
 def _beside_tyres(plan: Plan) -> Iterable[Sequence[str]]:
     """Yield the deviation of stiffnesses stated for the axles from those of the scenario's tyres."""
-    from yawbench.orchestrator.wiring.make_plan import TYRE_FORCES
-    from yawbench.orchestrator.wiring.parameters import STATIC_LOADS, STIFFNESSES, known_car
     from yawbench.tyre_stand import cornering_stiffness
+    from yawbench.vehicles.car import TYRE_FORCES
+    from yawbench.vehicles.derivations import STATIC_LOADS, STIFFNESSES, known_car
 
     takers = _grouped(
         ((name, float(instance.parameters[name])), instance.name)
         for instance in plan.instances
         for name in STIFFNESSES
-        if name in instance.parameters and instance.origins[name].kind not in ("derived", "default")
+        if name in instance.parameters and instance.origin(name).kind not in ("derived", "default")
     )
     tyres = [u for u in plan.instances if {v.name for v in u.fmu.of("output")} >= {*TYRE_FORCES}]
     car = known_car(plan.scenario.get("vehicle_parameters", {})) if takers and len(tyres) == 1 else None
@@ -246,8 +246,8 @@ def _idle(plan: Plan) -> list[str]:
 
 def _matters(instance: Instance, name: str) -> bool:
     """Return whether a default is worth showing: it concerns the car, its speed or the road."""
-    from yawbench.orchestrator.wiring.context import FACTS
-    from yawbench.orchestrator.wiring.suspicious_values import OF_CAR
+    from yawbench.vehicles.suspicious_values import OF_CAR
+    from yawbench.vocabulary.facts import FACTS
 
     return name in OF_CAR or any(
         name in fact.inputs or fact.counts(instance, name) for fact in FACTS.values()

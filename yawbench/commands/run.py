@@ -268,7 +268,6 @@ def converge(
 
     from yawbench.figures.style import save
     from yawbench.foundation.safe_files import write_whole
-    from yawbench.orchestrator.recordings.motion import ANGLES, SPEED_SIGNALS
     from yawbench.orchestrator.results.folder_names import default_folder
     from yawbench.reports.page_parts import image_of
     from yawbench.studies.convergence import (
@@ -279,6 +278,7 @@ def converge(
         refinements,
     )
     from yawbench.studies.tables import to_csv
+    from yawbench.vocabulary.motion import ANGLES, SPEED_SIGNALS
 
     for name in algorithm or ():
         if name not in ALGORITHMS:

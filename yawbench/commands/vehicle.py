@@ -65,14 +65,14 @@ def vehicle(
     from yawbench.orchestrator.scenario import loader, yaml_lines
     from yawbench.orchestrator.scenario.schema import Vehicle
     from yawbench.orchestrator.scenario.schema_validation import validated
-    from yawbench.orchestrator.wiring.suspicious_values import suspicious_vehicle
     from yawbench.planner import Planner
     from yawbench.proving_ground.handling import TestTrack, draw_cars, fitting_plant, handling_of
+    from yawbench.vehicles.suspicious_values import suspicious_vehicle
 
     file = loader.find(file, "a vehicle file")
     document = yaml_lines.read(file, what="vehicle file")
     spec = validated(Vehicle, document)
-    for warning in suspicious_vehicle(spec.parameters):
+    for warning in suspicious_vehicle(spec.values):
         say(f"note: {warning}")
     planner = Planner(build=options.build)
     names = plant.split(",") if plant else [fitting_plant(file, tyre, options.fmus, planner)]

@@ -23,7 +23,7 @@ from yawbench.foundation.errors import ScenarioError
 from yawbench.foundation.messages import cut, fold, hint
 from yawbench.metrics.expressions import columns_of, reference_of, while_moving
 from yawbench.metrics.measures import variable_of, words
-from yawbench.orchestrator.recordings.motion import largest
+from yawbench.vehicles.motion import largest
 from yawbench.vocabulary.wheels import WHEEL_NAMES, wheels
 
 from .display import LabelledRun, digits_of, in_formula, shown_unit, unit_of_signal

@@ -15,9 +15,9 @@ import numpy as np
 
 from yawbench.metrics.expressions import columns_of, reference_of
 from yawbench.metrics.measures import variable_of, words
-from yawbench.orchestrator.recordings.motion import largest
 from yawbench.orchestrator.results.reader import Results
 from yawbench.orchestrator.signal_names import VARIABLE
+from yawbench.vehicles.motion import largest
 
 from .display import LabelledRun, digits_of, in_formula, shown_unit, unit_of_signal
 from .style import line_style, literal, note_above, reference_style

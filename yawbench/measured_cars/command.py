@@ -231,7 +231,7 @@ def vehicle_text(result: FitResult, folder: Path, planner: Planner) -> str:
         and Target.parse(parameter.name).kind in ("vehicle_parameter", "parameter")
     }
     lines.append("parameters:")
-    for name, value in scenario.vehicle_file.parameters.items():
+    for name, value in scenario.vehicle_file.values.items():
         if name not in fitted:
             lines.append(f"  {name}: {json.dumps(value)}")
     for name, parameter in fitted.items():

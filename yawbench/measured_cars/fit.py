@@ -41,7 +41,6 @@ from yawbench.foundation.workers import Pool
 from yawbench.orchestrator.plan import InputSeries, Instance, Override
 from yawbench.orchestrator.recordings.gaps import by_signals
 from yawbench.orchestrator.recordings.measurement import Measurement, load_measurement
-from yawbench.orchestrator.recordings.motion import ANGLES, LEAST_SPEED, standing
 from yawbench.orchestrator.recordings.segment import LowPass, Segment
 from yawbench.orchestrator.results.freshness import key_of
 from yawbench.orchestrator.scenario import yaml_lines
@@ -52,6 +51,8 @@ from yawbench.orchestrator.scenario.yaml_lines import Document
 from yawbench.orchestrator.signal_names import INPUTS, SignalName, match
 from yawbench.planner import Planner
 from yawbench.studies.jobs import Job, execute
+from yawbench.vehicles.motion import standing
+from yawbench.vocabulary.motion import ANGLES, LEAST_SPEED
 from yawbench.vocabulary.signals import SIGNALS
 
 from .least_squares import Simulated, Window
@@ -322,8 +323,8 @@ class ScenarioModel:
         scenario = planner.load(fit.scenario)
         self._series = {
             key: spec
-            for key, spec in scenario.inputs.items()
-            if isinstance(spec, SeriesSpec)
+            for key, given in scenario.inputs.items()
+            if isinstance(spec := given.value, SeriesSpec)
             and (fit.scenario.parent / spec.file).resolve() == fit.measurement.path.resolve()
         }
         if not self._series:

@@ -24,9 +24,9 @@ from yawbench.foundation.messages import hint
 from yawbench.foundation.workers import Pool
 from yawbench.orchestrator.scenario import yaml_lines
 from yawbench.orchestrator.signal_names import Target
-from yawbench.orchestrator.wiring.context import FACTS
 from yawbench.planner import Planner
 from yawbench.studies.jobs import NEEDED
+from yawbench.vocabulary.facts import FACTS
 from yawbench.vocabulary.signals import SIGNALS
 from yawbench.vocabulary.vehicle import CAR
 
@@ -424,8 +424,8 @@ def _value_of(target: Target, model: ScenarioModel) -> tuple[float | None, str |
     """
     name = target.variable
     if target.kind == "fact":
-        value = model.planner.load(model.fit.scenario).friction if name == "friction" else None
-        return (value if isinstance(value, float) else None), FACTS[name].unit, False
+        given = model.planner.load(model.fit.scenario).friction if name == "friction" else None
+        return (given.value if given and isinstance(given.value, float) else None), FACTS[name].unit, False
     having = [
         instance
         for instance in model.base.instances

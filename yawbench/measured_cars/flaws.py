@@ -24,8 +24,9 @@ from yawbench.foundation.errors import ScenarioError
 from yawbench.foundation.messages import counted, listed
 from yawbench.orchestrator.recordings.gaps import Gap, by_signals
 from yawbench.orchestrator.recordings.measurement import MEASURABLE, Measurement, load_measurement
-from yawbench.orchestrator.recordings.motion import ANGLES, standing
 from yawbench.orchestrator.recordings.segment import LowPass, Segment, running_median, without_spikes
+from yawbench.vehicles.motion import standing
+from yawbench.vocabulary.motion import ANGLES
 
 FACTORS = {"yaw_rate": 180.0 / np.pi, "acceleration_y": 9.80665, "velocity_x": 3.6}
 """Signal -> factor by which it is wrong if its unit is mistaken: deg for rad, g for m/s2, km/h for m/s."""

@@ -25,8 +25,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from yawbench.orchestrator.recordings.measurement import Measurement
-from yawbench.orchestrator.recordings.motion import standing
 from yawbench.orchestrator.recordings.segment import Segment
+from yawbench.vehicles.motion import standing
 from yawbench.vocabulary.gravity import G
 
 from .least_squares import Simulated, Window

@@ -38,7 +38,6 @@ from yawbench.foundation.safe_files import reads
 from yawbench.metrics.measures import words
 from yawbench.metrics.verdict import Verdict, apart, compare, not_judged, worded, worst
 from yawbench.orchestrator.recordings.measurement import Measurement
-from yawbench.orchestrator.recordings.motion import ANGLES, LEAST_SPEED, standing
 from yawbench.orchestrator.recordings.segment import Segment
 from yawbench.orchestrator.results.reader import Results
 from yawbench.orchestrator.scenario import loader, yaml_lines
@@ -46,6 +45,8 @@ from yawbench.orchestrator.scenario.quantities import convert
 from yawbench.orchestrator.scenario.schema_validation import StrictModel, validated
 from yawbench.orchestrator.scenario.yaml_lines import Document
 from yawbench.proving_ground.trace import Trace, trace_of
+from yawbench.vehicles.motion import standing
+from yawbench.vocabulary.motion import ANGLES, LEAST_SPEED
 from yawbench.vocabulary.signals import SIGNALS
 
 if TYPE_CHECKING:

@@ -32,9 +32,10 @@ import numpy as np
 from yawbench.foundation.errors import ScenarioError
 from yawbench.foundation.messages import closest, fold, hint, listed, short, span
 from yawbench.orchestrator.plan import SENSING
-from yawbench.orchestrator.recordings.motion import ANGLES, LEAST_SPEED, SPEED_SIGNALS, nearest_turn, standing
 from yawbench.orchestrator.scenario.quantities import convert
 from yawbench.orchestrator.signal_names import VARIABLE, SignalName
+from yawbench.vehicles.motion import nearest_turn, standing
+from yawbench.vocabulary.motion import ANGLES, LEAST_SPEED, SPEED_SIGNALS
 from yawbench.vocabulary.wheels import WHEELS, wheels
 
 from .measures import MEASURES, Measure, si_of, symbol, variable_of, words

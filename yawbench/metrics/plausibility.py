@@ -16,8 +16,8 @@ import numpy as np
 
 from yawbench.foundation.errors import Diagnostic, Location
 from yawbench.orchestrator.plan import Plan
-from yawbench.orchestrator.recordings.motion import standing
 from yawbench.orchestrator.results.record_of_plan import recorded_variables
+from yawbench.vehicles.motion import standing
 from yawbench.vocabulary.gravity import G
 from yawbench.vocabulary.wheels import WHEEL_NAMES, wheels
 

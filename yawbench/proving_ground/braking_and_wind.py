@@ -57,7 +57,8 @@ import numpy as np
 
 from yawbench.metrics.measures import running_integral
 from yawbench.metrics.verdict import NotJudged
-from yawbench.orchestrator.recordings.motion import LEAST_SPEED, largest
+from yawbench.vehicles.motion import largest
+from yawbench.vocabulary.motion import LEAST_SPEED
 
 from .standard_tests import Evaluation, evaluation
 from .trace import Trace, at, first_crossing, known, refuse_opposed, running_mean

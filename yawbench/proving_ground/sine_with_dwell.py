@@ -40,7 +40,7 @@ from yawbench.figures.display import shown
 from yawbench.foundation.messages import listed
 from yawbench.metrics.measures import running_integral
 from yawbench.metrics.verdict import NotJudged, Status, Verdict, apart, compare, not_judged, worded, worst
-from yawbench.orchestrator.recordings.motion import largest
+from yawbench.vehicles.motion import largest
 
 from .standard_tests import Evaluation, Limit, Mark, SeriesDriver, SeriesRun, TestSeries, evaluation
 from .trace import Trace, at, first_crossing, likeness, opposed, prepared, refuse_opposed, running_mean

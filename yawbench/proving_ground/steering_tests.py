@@ -73,9 +73,10 @@ import numpy as np
 from yawbench.foundation.errors import ScenarioError, text_of
 from yawbench.metrics.verdict import NotJudged, apart, compare, not_judged
 from yawbench.orchestrator.plan import Plan
-from yawbench.orchestrator.recordings.motion import LEAST_SPEED, largest
 from yawbench.orchestrator.signal_names import Target
+from yawbench.vehicles.motion import largest
 from yawbench.vocabulary.lane_change import lanes_of
+from yawbench.vocabulary.motion import LEAST_SPEED
 
 from .sine_with_dwell import AMPLITUDE
 from .standard_tests import Evaluation, SeriesDriver, SeriesRun, TestSeries, evaluation

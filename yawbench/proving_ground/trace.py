@@ -29,12 +29,12 @@ from yawbench.foundation.errors import ResultsError
 from yawbench.metrics.expressions import columns_of
 from yawbench.metrics.measures import si_of
 from yawbench.metrics.verdict import NotJudged
-from yawbench.orchestrator.recordings import motion
 from yawbench.orchestrator.recordings.gaps import gaps_noted
 from yawbench.orchestrator.recordings.segment import LowPass, even_grid, resample
 from yawbench.orchestrator.results.reader import Results
 from yawbench.orchestrator.results.run_record import FmuRecord
 from yawbench.orchestrator.scenario.overrides import with_changes
+from yawbench.vehicles import motion
 from yawbench.vocabulary.signals import SIGNALS
 
 CUT_OFF = {"steering_wheel_angle": 10.0, "yaw_rate": 6.0, "acceleration_y": 6.0}

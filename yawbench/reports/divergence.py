@@ -12,12 +12,12 @@ from yawbench.figures.display import shown, unit_of_signal
 from yawbench.foundation.messages import counted, resolved, span, star
 from yawbench.metrics.expressions import angles_in, standing_in
 from yawbench.orchestrator.recordings.gaps import gaps_noted, outside
-from yawbench.orchestrator.recordings.motion import nearest_turn
 from yawbench.orchestrator.results.measurement_results import MeasuredResults
 from yawbench.orchestrator.results.reader import Results
 from yawbench.orchestrator.results.run_record import RunRecord
 from yawbench.orchestrator.signal_names import SignalName
 from yawbench.studies.tables import Table
+from yawbench.vehicles.motion import nearest_turn
 from yawbench.vocabulary.wheels import WHEELS
 
 SAME = 1e-9

@@ -12,9 +12,9 @@ from yawbench.foundation.errors import ScenarioError
 from yawbench.metrics.expressions import metric
 from yawbench.metrics.verdict import Status, worded
 from yawbench.orchestrator.plan import Override
-from yawbench.orchestrator.scenario.loader import load_scenario
 from yawbench.orchestrator.scenario.overrides import changed, swap_of
 from yawbench.orchestrator.scenario.schema_validation import made
+from yawbench.planner import Planner
 
 from .claim_schema import text_of
 from .experiment import LoadedExperiment, NamedRun, experiment_of
@@ -37,7 +37,7 @@ FIGURE_SPECS = [
 def comparison(scenario: Path, swaps: Sequence[str], changes: Sequence[Override]) -> LoadedExperiment:
     """Return the experiment that compares a scenario's variants (see `variants`)."""
     runs = variants(scenario, swaps, changes)
-    title = load_scenario(scenario, changes=changes).title or scenario.stem
+    title = Planner().load(scenario, changes).title or scenario.stem
     exchanged = " and ".join(dict.fromkeys(text.partition("=")[0].strip() for text in swaps))
     title = f"{title} ({exchanged} exchanged)"
     return experiment_of(scenario, runs, changes=changes, title=title, figures=FIGURE_SPECS)
@@ -59,7 +59,7 @@ def variants(scenario: Path, swaps: Sequence[str], changes: Sequence[Override]) 
     choices = _choices(swaps)
     if all(len(names) == 1 for names in choices.values()):
         swapped = [swap_of(instance, names[0], "--swap")[0] for instance, names in choices.items()]
-        own = load_scenario(scenario, changes=[*swapped, *changes]).replaced
+        own = Planner().load(scenario, [*swapped, *changes]).replaced
         for instance, names in choices.items():
             fmu = str(scenario.absolute().parent / own[instance]) if is_path(own[instance]) else own[instance]
             names[:0] = [fmu] if fmu not in names else []

@@ -22,10 +22,10 @@ from yawbench.foundation.errors import ResultsError, ScenarioError
 from yawbench.metrics.expressions import MetricValue, while_moving
 from yawbench.metrics.measures import variable_of, words
 from yawbench.orchestrator.plan import Override
-from yawbench.orchestrator.recordings.motion import largest
-from yawbench.orchestrator.scenario.loader import load_scenario
 from yawbench.orchestrator.scenario.overrides import with_changes
 from yawbench.orchestrator.signal_names import SignalName
+from yawbench.planner import Planner
+from yawbench.vehicles.motion import largest
 
 from .experiment import LoadedExperiment, NamedRun, experiment_of
 from .experiment_result import ExperimentResult
@@ -66,7 +66,7 @@ def refinements(
     Raises:
         ScenarioError: the scenario or an option is wrong.
     """
-    loaded = load_scenario(scenario, changes=changes)
+    loaded = Planner().load(scenario, changes)
     if not all(SignalName.parse(signal)):
         raise ScenarioError(
             f"--signal {signal}: write INSTANCE.VARIABLE, for example plant.yaw_rate", code="option-invalid"

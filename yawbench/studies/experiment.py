@@ -20,8 +20,9 @@ from yawbench.orchestrator.scenario import quantities
 from yawbench.orchestrator.scenario.schema_validation import made
 from yawbench.orchestrator.scenario.yaml_lines import dotted
 from yawbench.orchestrator.signal_names import Target
-from yawbench.orchestrator.wiring.context import FACTS, reached
+from yawbench.orchestrator.wiring.context import reached
 from yawbench.planner import Planner
+from yawbench.vocabulary.facts import FACTS
 
 from .axes import AxisSpec, DesignAxisSpec, DesignPoint, Level, changes_at, grid, latin_hypercube, levels_of
 from .claim_schema import MetricReference, MetricSpec, si_number

@@ -19,7 +19,7 @@ from yawbench.foundation.errors import ScenarioError
 from yawbench.foundation.messages import hint, short
 from yawbench.foundation.safe_files import reads
 from yawbench.orchestrator.plan import Override
-from yawbench.orchestrator.scenario import loader, overrides, yaml_lines
+from yawbench.orchestrator.scenario import loader, yaml_lines
 from yawbench.orchestrator.scenario.schema_validation import validated
 from yawbench.orchestrator.scenario.yaml_lines import Document, KeyPath
 from yawbench.orchestrator.signal_names import Target
@@ -84,7 +84,6 @@ def load_experiment(path: Path | str, *, changes: Sequence[Override] = ()) -> Lo
     """
     path = Path(path)
     document = yaml_lines.read(path, what="experiment file")
-    overrides.apply_to_all_runs(document, changes)
     spec = validated(ExperimentFile, document)
     spec = expanded(spec, document)
     runs = {"": NamedRun("", "", "", path.parent / spec.scenario, ())} if spec.scenario else {}
@@ -102,7 +101,7 @@ def load_experiment(path: Path | str, *, changes: Sequence[Override] = ()) -> Lo
     own = changes_of_file(spec, path.parent, "sweep" if spec.axes else "study")
     for_all = tuple(change for change in own if change.target not in overridden)
     experiment = LoadedExperiment(path, spec, runs, for_all, tuple(overridden.values()))
-    for problem in problems_of(spec, runs) if not document.errors else ():
+    for problem in problems_of(spec, runs, overridden) if not document.errors else ():
         document.report(*problem)
     document.raise_errors()
     _ = experiment.loaded_sections  # a mistake in a file that they name is told before the runs are made

@@ -48,9 +48,11 @@ COLUMNS = (RUN, "status", "reason", "warnings", "key")
 """Columns of the table besides axes and metrics."""
 
 
-def problems_of(spec: ExperimentSpec, runs: Collection[str]) -> list[Problem]:
-    """Return all mistakes in an experiment with these named runs."""
-    found = [*_in_axes(spec), *_in_names(spec, runs), *_in_correlations(spec), *_in_limits(spec)]
+def problems_of(
+    spec: ExperimentSpec, runs: Collection[str], overridden: Iterable[Target] = ()
+) -> list[Problem]:
+    """Return all mistakes in an experiment with these named runs; `overridden`: targets that options set."""
+    found = [*_in_axes(spec, overridden), *_in_names(spec, runs), *_in_correlations(spec), *_in_limits(spec)]
     for i, figure in enumerate(spec.figures):
         problems = problems_of_figure(spec, runs, figure)
         if figure.name in [other.name for other in spec.figures[:i]]:
@@ -113,9 +115,9 @@ def _unknown(
             yield Problem(key, f"there is no {what.removesuffix(' or run')} {name!r}{guess}", "name-unknown")
 
 
-def _in_axes(spec: ExperimentSpec) -> Iterator[Problem]:
+def _in_axes(spec: ExperimentSpec, overridden: Iterable[Target]) -> Iterator[Problem]:
     """Yield targets of two axes, or of an axis and `set` or `swap`; sections; names of other columns."""
-    seen: dict[Target, str] = dict.fromkeys(spec.targets, "set and swap")
+    seen: dict[Target, str] = dict.fromkeys([*spec.targets, *overridden], "set and swap")
     for name, axis in spec.axes.items():
         for target in axis.targets:
             if target in seen:

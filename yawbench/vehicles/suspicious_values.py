@@ -12,19 +12,20 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from functools import lru_cache
 from itertools import product
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from yawbench.fmus.fmu import Value, Variable
 from yawbench.foundation.errors import Diagnostic, Location
 from yawbench.foundation.messages import fold, listed
+from yawbench.orchestrator.plan import DEFAULT, OF_FILES, Given, Instance, OriginKind
+from yawbench.orchestrator.scenario.loader import LoadedScenario
+from yawbench.orchestrator.scenario.quantities import exact_text, meant_unit, number_and_unit
+from yawbench.vocabulary.facts import FACTS
 from yawbench.vocabulary.roles import without_role
 from yawbench.vocabulary.vehicle import CAR
 
-from ..plan import DEFAULT, Instance, OriginKind
-from ..scenario.loader import LoadedScenario
-from ..scenario.quantities import exact_text, meant_unit, number_and_unit
-from .context import FACTS
-from .parameters import STIFFNESSES, known_car
+from .derivations import STIFFNESSES, known_car
+from .tir import TyreFile
 
 PLAUSIBLE = {
     "friction": (0.0, 2.0),  # chosen: above racing tyres on dry asphalt
@@ -36,8 +37,6 @@ OF_CAR = (*(name for name, quantity in CAR.items() if quantity.needed), *STIFFNE
 """Parameters that describe the car in any instance."""
 IN_FACTS = {name for fact in FACTS.values() for name in (*fact.inputs, *fact.parameters)}
 """Inputs and parameters that facts set."""
-OF_FILES = ("default", "vehicle", "derived", "scenario", "file")
-"""Origins of values that are not overrides."""
 SAME = 1e-9
 """Relative difference of values that count as equal: rounding of a conversion."""
 RADIUS = 0.03
@@ -54,6 +53,17 @@ class GivenValue(NamedTuple):
     value: Value
     origin: OriginKind
     variable: Variable
+    given: Given[Any]  # in the file or the override
+
+    @property
+    def written(self) -> object:
+        """The value as it is written."""
+        return self.given.value
+
+    @property
+    def unit(self) -> str:
+        """The unit that the value names; "" without one."""
+        return self.given.unit
 
     @property
     def signal(self) -> str:
@@ -81,12 +91,12 @@ class _Quantity(NamedTuple):
 def suspicious_values(scenario: LoadedScenario, instances: Mapping[str, Instance]) -> list[Diagnostic]:
     """Return warnings about the values of a scenario's instances."""
     parameters, constants = [*_parameters(instances.values())], [*_constants(instances.values())]
-    of_car = _of_vehicle(scenario.vehicle_file.parameters)
+    of_car = _of_vehicle(scenario.vehicle_file.values)
     return [
         *_two_values(instances, parameters, constants),
         *_other_cars(scenario, parameters),
         *_of_tyres(scenario, instances, parameters),
-        *_implausible([*of_car, *_of_instances(scenario, [*parameters, *constants])]),
+        *_implausible([*of_car, *_of_instances([*parameters, *constants])]),
         *_steps(scenario, instances.values()),
     ]
 
@@ -132,7 +142,7 @@ def _in_si(name: str, written: Value) -> float | None:
         return None
 
 
-def _of_instances(scenario: LoadedScenario, given: Iterable[GivenValue]) -> Iterator[_Quantity]:
+def _of_instances(given: Iterable[GivenValue]) -> Iterator[_Quantity]:
     """Yield the values that the scenario or an override gives to instances."""
     for item in given:
         if item.origin in ("default", "vehicle", "derived") or not isinstance(item.value, float):
@@ -140,20 +150,10 @@ def _of_instances(scenario: LoadedScenario, given: Iterable[GivenValue]) -> Iter
         name, unit = item.name, item.variable.unit or "1"
         if name in FACTS["friction"].inputs:
             name = "friction"
-        written = _written(scenario, item)
-        plausible = PLAUSIBLE.get(name, PLAUSIBLE.get(unit)) if not isinstance(written, str) else None
+        plausible = PLAUSIBLE.get(name, PLAUSIBLE.get(unit)) if not item.unit else None
         if name in CAR and unit == CAR[name].unit:
             plausible = CAR[name].plausible
-        yield _Quantity(item.signal, name, item.value, written, unit, plausible)
-
-
-def _written(scenario: LoadedScenario, item: GivenValue) -> object:
-    """Return a value as the scenario, its vehicle file or a fact gives it."""
-    for name, fact in FACTS.items():
-        if item.name in fact.parameters and isinstance(written := getattr(scenario, name), str):
-            return written
-    own = scenario.units[item.instance].parameters.get(item.name)
-    return scenario.vehicle_file.parameters.get(item.name) if own is None else own
+        yield _Quantity(item.signal, name, item.value, item.written, unit, plausible)
 
 
 def _steps(scenario: LoadedScenario, instances: Iterable[Instance]) -> Iterator[Diagnostic]:
@@ -196,7 +196,7 @@ def _of_tyres(
             says = f"{item.signal} is {item.value}: {tyres[0].name} follows {law}"
             yield _warning("tyre-mismatch", item.signal, says)
     for file, item in product(scenario.tyre_files.values(), parameters):
-        radius = file.rolling_radius
+        radius = file.rolling_radius if isinstance(file, TyreFile) else None
         if item.name != "wheel_radius" or not radius or not isinstance(item.value, float):
             continue
         if abs(item.value / radius - 1.0) > RADIUS:
@@ -254,18 +254,19 @@ def _differ(items: list[GivenValue], *, start: bool = False) -> bool:
 def _parameters(instances: Iterable[Instance]) -> Iterator[GivenValue]:
     for instance in instances:
         for variable in instance.fmu.of("parameter"):
-            value = instance.parameter(variable.name)
-            origin = instance.origins.get(variable.name, DEFAULT).kind
-            if value is not None and (value != 0 or origin != DEFAULT.kind):  # 0 by default: not given
-                yield GivenValue(instance.name, variable.name, value, origin, variable)
+            value, given = instance.parameter(variable.name), instance.given[variable.name]
+            if value is not None and (value != 0 or given.origin != DEFAULT):  # 0 by default: not given
+                yield GivenValue(instance.name, variable.name, value, given.origin.kind, variable, given)
 
 
 def _constants(instances: Iterable[Instance]) -> Iterator[GivenValue]:
     for instance in instances:
         for name, value in instance.constants.items():
             if name not in instance.series:
-                origin = instance.origins.get(name, DEFAULT).kind
-                yield GivenValue(instance.name, name, value, origin, instance.fmu.variables[name])
+                given = instance.given.get(name, Given(value))
+                yield GivenValue(
+                    instance.name, name, value, given.origin.kind, instance.fmu.variables[name], given
+                )
 
 
 def _values_differ(name: str, items: list[GivenValue], way_out: str) -> Diagnostic:

@@ -23,6 +23,7 @@ from typing import Literal, NamedTuple
 from yawbench.foundation.errors import Diagnostic, Location, ScenarioError, Severity
 from yawbench.foundation.messages import listed, short
 from yawbench.foundation.safe_files import TEXT, read_bytes, reads, reason
+from yawbench.orchestrator.scenario.schema import PropertyFile
 
 Side = Literal["LEFT", "RIGHT"]
 SIDES: tuple[Side, ...] = ("LEFT", "RIGHT")
@@ -146,18 +147,13 @@ UNITS = {
 
 
 @dataclass(frozen=True)
-class TyreFile:
-    """The content of a tyre property file."""
+class TyreFile(PropertyFile):
+    """The content of a tyre property file; its parameters have names without axle, such as pcx1."""
 
-    path: Path
-    sha256: str
     kind: str  # "MF-Tyre 6.2"
     side: Side
-    values: dict[str, float]
-    """Parameter name without axle, such as pcx1 -> its value in SI units."""
     rolling_radius: float | None
     """Effective rolling radius at nominal load [m], None if the file does not determine it."""
-    warnings: tuple[Diagnostic, ...] = ()
 
     def record(self) -> dict[str, object]:
         """Return its entry in the run record."""
@@ -239,7 +235,7 @@ class _Reading:
         if self.errors:
             return None
         warnings = tuple(self.warnings)
-        return TyreFile(self.path, sha256, KINDS[kind], side, values, self._rolling_radius(), warnings)
+        return TyreFile(self.path, sha256, values, warnings, KINDS[kind], side, self._rolling_radius())
 
     # ---- the file's own description -----------------------------------------------------------------
 

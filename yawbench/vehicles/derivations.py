@@ -14,12 +14,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import NamedTuple
 
+from yawbench.fmus.fmu import Value, Variable
+from yawbench.orchestrator.wiring.parameters import value_for
 from yawbench.vocabulary.gravity import G
 from yawbench.vocabulary.vehicle import CAR
 
+STIFFNESSES = ("cornering_stiffness_front", "cornering_stiffness_rear")
+STATIC_LOADS = ("static_load_front", "static_load_rear")
+"""Quantities of the car at which the `STIFFNESSES` of its tyres are measured."""
 AGREES = 0.01
 """Tolerated relative difference between a given and a derived value. Chosen: rounding of data sheets."""
 
@@ -148,6 +153,21 @@ def car_of(quantities: Mapping[str, float]) -> CarQuantities:
         quantities: name of `CAR` -> value in SI.
     """
     return _derived(tuple(quantities.items()))
+
+
+def known_car(parameters: Mapping[str, Value]) -> CarQuantities:
+    """Return the quantities of a car that follow from the (valid) values of a vehicle file."""
+    of_car = {name: raw for name, raw in parameters.items() if name in CAR}
+    return car_of({name: float(value_for(quantity_of(name), raw)) for name, raw in of_car.items()})
+
+
+@cache
+def quantity_of(name: str) -> Variable:
+    """Return a parameter with the unit and limits of a quantity of a car."""
+    quantity = CAR[name]
+    return Variable(
+        name, 0, "Real", "parameter", "fixed", quantity.unit, None, quantity.minimum, None, quantity.text
+    )  # fmt: skip
 
 
 @lru_cache(maxsize=1024)

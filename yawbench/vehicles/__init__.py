@@ -1,0 +1,1 @@
+"""What is known of cars: quantities and what follows from them, tyre property files, motion, mistakes."""
