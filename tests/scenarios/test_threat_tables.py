@@ -7,7 +7,7 @@ import math
 import random
 from dataclasses import replace
 from pathlib import Path
-from statistics import median
+from statistics import fmean, median
 
 import pytest
 
@@ -78,11 +78,12 @@ def test_the_sentences_on_threats_have_the_numbers_of_the_tables(published, text
     )
     assert sentence_has(
         text,
-        f"{100 * gains.laws.value:.1f} %",
+        f"{100 * gains.laws:.1f} %",
         f"{100 * gains.seeds.value:.1f} %",
         f"{gains.ratio.value:.1f}",
         f"{gains.ratio.bounds.low:.1f}",
         f"{gains.ratio.bounds.high:.1f}",
+        f"F({gains.degrees[0]}, {gains.degrees[1]}) = {gains.f:.1f}",
         "vary",
         "luck",
     )
@@ -100,17 +101,22 @@ def test_the_sentences_on_threats_have_the_numbers_of_the_tables(published, text
     }
     speed, braking, step, wind = (f"{x + 0.0:.1f}".replace("-0.0", "0.0") for x in correlations.values())
     assert sentence_has(text, wind, step, braking, speed, "side", "wind")
-    apart = {test.title: test.scores.told_apart for test in threats_page.disciplines(published)}
-    assert sentence_has(text, apart["Step steer"], "*Step steer*", "210", "pairs")
-    assert sentence_has(text, apart["Gust of side wind"], "210", "pairs")
+    apart = {test.title: test.scores.apart for test in threats_page.disciplines(published)}
+    for title in ("Step steer", "Gust of side wind"):
+        assert sentence_has(text, int(apart[title].better.sum()), title.split()[-1], "210", "pairs")
 
 
 def test_the_sentences_on_who_is_first_are_those_of_the_tables(published, text):
     scores, titles = scored(published), threats_page.titles_of(published)
-    known = threat_tables.differences(published, scores)
-    assert sentence_has(text, f"{len(known.equals)} entries", "clearly", "better")
-    laws = len(known.helped) + len(known.others)
-    assert sentence_has(text, len(known.helped), laws, "helps", "laws")
+    behind = scores.behind(scores.order()[0])
+    assert sentence_has(text, f"{len(ENTRIES) - 1 - len(behind)} entries", "clearly", "better")
+    helped = compared_gains(published).helped
+    alone, sure = ([titles[law] for law, p in helped.items() if p[k] < 0.05] for k in (0, 1))
+    assert not sure and sentence_has(text, *alone, "helps", "alone", "no")
+    means = compared_gains(published).means
+    rise = {titles[law]: 100 * (fmean(tuned) - study) for law, (study, *tuned) in means.items()}
+    first, second = sorted(rise, key=rise.__getitem__, reverse=True)[:2]
+    assert sentence_has(text, first, second, f"{rise[first]:.0f}", f"{rise[second]:.0f} %", "levels", "rise")
     entries = published.complete[THREATS.main]
     without = scores_without(entries, published.positions(THREATS.main, entries), REFERENCE)
     assert scores.order()[0] == next(score.entry for score in scores.scores if score.by_rank == 1)
