@@ -192,7 +192,7 @@ def degrees(amplitude: float) -> str:
 RULE = (
     "Order: the number of conditions passed, then the share of runs that pass, then the peak sideslip, the "
     "last two in the mean over conditions. Interval: 95 % of the number passed (Clopper and Pearson). Place: "
-    "one more than the controllers that are clearly better, by exact tests corrected for their number, so that "
+    "one more than the controllers that are clearly better, by exact tests corrected for their number, so "
     "those that cannot be told apart share it. A run passes if it meets the regulation's criteria with at "
     "most 20° of sideslip; a condition is passed if all of its runs pass."
 )
