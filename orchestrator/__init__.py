@@ -1,4 +1,11 @@
-"""Scenario files become plans, plans become runs, runs become results: instances, wires and time."""
+"""Scenario files become plans, plans become runs, runs become results: instances, wires and time.
+
+`Scenario`, `Plan` and `Results` are the types that the rest of the program knows. The rooms, in the order of
+a run: `scenario`, `recordings`, `wiring`, `master`, `results`. Beside them `plan` (the type), `signal_names`,
+`coupling_algorithms` (with their theory) and `fault_kinds` (what can go wrong with a signal).
+
+Not here: cars, statistics, figures, HTML (`yawbench`).
+"""
 
 PLUGINS = {
     "kind of file": {

@@ -19,6 +19,7 @@ from . import (
     matrix_tables,
     metrics,
     monitor_tables,
+    rooms,
     schemas,
     signals,
     threat_tables,
@@ -40,6 +41,7 @@ PAGES: dict[str, Callable[[], str]] = {
     "reference/library.md": library.page,
     "trust.md": evidence.page,
     "reference/vehicles.md": vehicles.page,
+    **rooms.pages(),
 }
 """Path in the docs -> what returns its text."""
 PUBLISHED = (blind_tables, matrix_tables, monitor_tables, threat_tables)

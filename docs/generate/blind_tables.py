@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from yawbench.studies.confidence import Bounds, bootstrap, percentile_bounds, resample
+from yawbench.studies.confidence import Bounds, crossed_interval
 
 from .published import replaced, wrapped, write_pages
 
@@ -47,9 +47,9 @@ def published() -> dict[str, Errors]:
 
 
 def mean_bounds(errors: np.ndarray) -> Bounds:
-    """Return the bounds of the mean over manoeuvres and seeds, both drawn in blocks."""
-    samples = bootstrap(lambda *drawn: resample(errors, *drawn).mean(axis=(1, 2)), errors.shape)
-    return Bounds(*map(float, percentile_bounds(samples)))
+    """Return the bounds of the mean over manoeuvres and seeds, samples both."""
+    mean, half = crossed_interval(errors)
+    return Bounds(mean - half, mean + half)
 
 
 def added(errors: Errors) -> Errors:
@@ -68,7 +68,7 @@ def table_text(metrics: Mapping[str, Errors]) -> str:
         for name in ESTIMATORS:
             more = "-" if error == RIGHT else _with_bounds(added(metrics[name])[error], "+")
             worst = metrics[f"{name}_worst"][error].max()
-            cells += [_with_bounds(metrics[name][error]), more, f"{worst:.2f}°"]
+            cells += [f"{metrics[name][error].mean():.2f}°", more, f"{worst:.2f}°"]
         lines.append(f"| {error} | {' | '.join(cells)} |")
     return "\n".join(lines)
 
@@ -113,8 +113,8 @@ def pages_with_tables() -> dict[Path, str]:
     manoeuvres, seeds = metrics["observer"][RIGHT].shape
     note = (
         f"Errors of the sideslip angle over whole runs: means over {manoeuvres} manoeuvres and {seeds} seeds "
-        "of the noise, with 95 % intervals of a bootstrap that draws manoeuvres and seeds, in blocks; with "
-        "so few manoeuvres they say little about others. Worst second: the largest rms over a second."
+        "of the noise, with 95 % intervals for which both are samples (Satterthwaite); with so few "
+        "manoeuvres they are wide. Worst second: the largest rms over a second."
     )
     first = (
         f"Over these {manoeuvres} manoeuvres a bank that is not measured harms most. "

@@ -4,23 +4,20 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
 
 from yawbench.foundation.messages import listed
 from yawbench.ranking import threats_page
 from yawbench.ranking.ranking_tables import gains_sentence, gains_table, seeds_table
 from yawbench.ranking.threat_runs import ThreatResult, published_result
-from yawbench.ranking.threat_scores import ScoreTable, compared_gains, resampled_scores, scored
-from yawbench.ranking.threats import REFERENCE, load_threats
-from yawbench.studies.confidence import percentile_bounds
+from yawbench.ranking.threat_scores import ComparedGains, ScoreTable, compared_gains, scored
+from yawbench.ranking.threats import load_threats
+from yawbench.studies.confidence import CONFIDENCE
 
 from .published import markdown, replaced, wrapped
 
 ROOT = Path(__file__).resolve().parents[2]
 FILE = ROOT / "scenarios" / "proving_ground" / "threats.yaml"
 PAGE = ROOT / "docs" / "ranking.md"
-TUNED = "tuned "
-"""Begin of the titles of tuned entries."""
 
 
 def tables_text(result: ThreatResult) -> str:
@@ -28,10 +25,11 @@ def tables_text(result: ThreatResult) -> str:
     threats = result.threats
     scores = scored(result)
     order = scores.order()
+    gains = compared_gains(result)
     parts = [
         "### Who can be told apart",
         wrapped(threats_page.answer(result, scores)),
-        wrapped(differences_sentences(result, scores)),
+        wrapped(differences_sentences(result, scores, gains)),
         markdown(threats_page.main_table(result, scores)),
         "Highest levels survived:",
         markdown(threats_page.levels_table(result, order)),
@@ -40,11 +38,10 @@ def tables_text(result: ThreatResult) -> str:
         "### Orders without a threat or a car",
         *map(markdown, threats_page.orders_tables(result, scores)),
     ]
-    gains = compared_gains(result)
     if gains:
         parts += [
             "### Gains and laws",
-            wrapped(gains_sentence(gains)),
+            wrapped(gains_sentence(result, gains)),
             markdown(gains_table(result, gains)),
             markdown(seeds_table(result, gains)),
         ]
@@ -60,43 +57,25 @@ def tables_text(result: ThreatResult) -> str:
     return "\n\n".join(parts)
 
 
-class Differences(NamedTuple):
-    """Titles by the sign of differences of scores."""
-
-    equals: list[str]  # whom the best is not clearly better than
-    helped: list[str]  # laws that gain clearly by tuning
-    others: list[str]
-
-
-def differences(result: ThreatResult, scores: ScoreTable) -> Differences:
+def differences_sentences(result: ThreatResult, scores: ScoreTable, gains: ComparedGains | None) -> str:
     """Return whom the best is not clearly better than, and which laws gain clearly by tuning."""
-    threats, titles = result.threats, threats_page.titles_of(result)
-    entries = result.complete[threats.main]
-    positions, none = result.positions(threats.main, entries), entries.index(REFERENCE)
-
-    resampled = dict(zip(entries, resampled_scores(positions, none).T, strict=True))
-
-    def clear(better: str, worse: str) -> bool:
-        return bool(percentile_bounds(resampled[better] - resampled[worse])[0] > 0.0)
-
+    titles = threats_page.titles_of(result)
     best, *behind = scores.order()
-    own = {titles[name]: name for name in entries}
-    tuned = {title.removeprefix(TUNED): name for title, name in own.items() if title.startswith(TUNED)}
-    helped = [law for law, name in tuned.items() if clear(name, own[law])]
-    return Differences(
-        [titles[other] for other in behind if not clear(best, other)],
-        helped,
-        [law for law in tuned if law not in helped],
-    )
-
-
-def differences_sentences(result: ThreatResult, scores: ScoreTable) -> str:
-    """Return the differences in sentences."""
-    best = threats_page.titles_of(result)[scores.order()[0]]
-    equals, helped, others = (listed(titles) or "none" for titles in differences(result, scores))
+    equals = listed([titles[other] for other in behind if other not in scores.behind(best)]) or "none"
+    sentence = f"By these differences {titles[best]} is not clearly better than {equals}."
+    if gains is None:
+        return sentence
+    threats = result.threats
+    cars = listed(threats.cars_in(gains.setting))
+    better = [
+        listed([titles[law] for law, p in gains.helped.items() if p[corrected] < 1.0 - CONFIDENCE]) or "none"
+        for corrected in (0, 1)
+    ]
+    seeds = 1 + len(threats.spec.settings[gains.setting].seeds)
     return (
-        f"By these differences {best} is not clearly better than {equals}. Tuned gains are clearly "
-        f"better than those of the study for {helped}; not for {others}."
+        f"{sentence} Tuned gains, means over {seeds} seeds of the search and on the cars that it has not "
+        f"seen ({cars}), are clearly better than those of the study for {better[1]}, if corrected for the "
+        f"{len(gains.means)} laws; each taken alone, for {better[0]}."
     )
 
 

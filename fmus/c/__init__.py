@@ -1,1 +1,1 @@
-"""Build of components written in C, and the C code that they share."""
+"""Components written in C: their declaration, their build, and the headers that all C units share."""

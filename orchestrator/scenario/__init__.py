@@ -1,1 +1,7 @@
-"""Strict reading of scenario, vehicle and tyre property files and SSP archives; problems have their line."""
+"""Scenario, vehicle and tyre property files and SSP archives, read strictly; every problem has its line.
+
+`loader` finds and reads a file, `schema` says what it may hold, `overrides` changes values, `quantities`
+parses `90 km/h` and converts units. SSP archives become scenarios here, too.
+
+Not here: whether an FMU has such a parameter (`wiring`).
+"""

@@ -51,7 +51,7 @@ def test_the_first_cell_is_open_and_all_of_it_can_be_read_by_everyone(
 
 
 def test_threats_are_quoted_where_they_can_be_read(tmp_path):
-    assert "is clear in" in result_of_threats(RANKING.parent / "threats.yaml")
+    assert "clearly better" in result_of_threats(RANKING.parent / "threats.yaml")
     assert result_of_threats(tmp_path / "threats.yaml") == ""
     shutil.copy(RANKING.parent / "threats.yaml", tmp_path)  # without its published levels
     assert "is not known" in result_of_threats(tmp_path / "threats.yaml")

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import pytest
 from lxml import html
 
 from docs.generate.threat_tables import FILE
+from tests.refusals import mentions
 from yawbench.ranking.threat_runs import published_result
 from yawbench.ranking.threat_scores import scored
-from yawbench.ranking.threats import load_threats
+from yawbench.ranking.threats import REFERENCE, load_threats
 from yawbench.ranking.threats_page import compared_settings, threats_page
 
 from .browser import DESK, Browser
@@ -60,5 +62,8 @@ def test_every_level_is_on_the_page_and_counts_are_those_of_its_tables(published
     first = sum(score.place == 1 for score in scores.scores)
     answer = tree.xpath("string(//p[@class='said'])")
     assert answer.startswith(f"Of {len(entries)} controllers, {first} share the first place")
-    assert f"its sign is clear in {scores.told_apart} of {scores.pairs} pairs" in answer
-    assert f"no more than {scores.groups} of their 95 % intervals lie apart" in answer
+    order = scores.order()
+    better = sum(REFERENCE in scores.behind(entry) for entry in order)
+    between = sum(name != REFERENCE for entry in order for name in scores.behind(entry))
+    assert mentions(answer, f"{better} of {len(order) - 1} controllers", "no control")
+    assert mentions(answer, between, f"{math.comb(len(order) - 1, 2)} pairs")

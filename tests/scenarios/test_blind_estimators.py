@@ -53,15 +53,14 @@ def test_an_error_that_adds_nothing_has_an_interval_of_zero_and_the_worst_is_nam
     }
     assert blind_tables.mean_bounds(blind_tables.added(metrics["observer"])["mass"]) == (0.0, 0.0)
     low, high = blind_tables.mean_bounds(right)
-    assert 1.0 <= low < 1.6 < high <= 2.2
+    assert low < 1.6 < high
     text = blind_tables.worst_sentences(metrics)
     assert "Observer: a bank adds 0.50° (0.50 to 0.50) to the rms, more than any other" in text
     metrics["observer"]["slope"] = right + np.array([[0.0, 0.0], [0.9, 0.9]])
     metrics["observer"]["mass"] = right + 0.1
-    assert "not separable from the next (paired: worse than slope by +0.05° (-0.40 to +0.50))" in (
-        blind_tables.worst_sentences(metrics)
-    )
-    assert "at most 0.45° (0.00 to 0.90) to the observer's mean rms (slope), 0.90° in the worst run" in (
+    text = blind_tables.worst_sentences(metrics)  # 0.45 times Student's 12.71
+    assert "not separable from the next (paired: worse than slope by +0.05° (-5.67 to +5.77))" in text
+    assert "at most 0.45° (-5.27 to 6.17) to the observer's mean rms (slope), 0.90° in the worst run" in (
         blind_tables.parameters_sentence(metrics)
     )
 

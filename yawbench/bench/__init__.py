@@ -1,3 +1,3 @@
-"""The bench: a server of results pages, and runs under sliders."""
+"""The bench: a server of results pages, and runs under sliders (`yawbench serve`)."""
 
 PLUGINS = {"command": {"serve": "yawbench.bench.command:serve"}}

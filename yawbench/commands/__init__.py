@@ -1,4 +1,9 @@
-"""The subcommands of `yawbench`, thin: options in, tables and pages out."""
+"""The subcommands of `yawbench`, thin: options in, tables and pages out; a module for each.
+
+`options` has the options that several share, `output` prints for people, `--json` and `--latex`.
+
+Not here: commands of wings, which stand with their wing.
+"""
 
 _MODULES = {
     "new": "new",

@@ -1,4 +1,7 @@
-"""Interoperability: SSP export, and the same scenario run by other co-simulation masters."""
+"""Interoperability: SSP export, and the same scenario run by other co-simulation masters.
+
+Not here: reading SSP archives (`yawbench.orchestrator.scenario`).
+"""
 
 PLUGINS = {
     "command": {

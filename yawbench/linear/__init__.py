@@ -1,4 +1,4 @@
-"""Linear models of a scenario around an operating point."""
+"""Linear models of a scenario around an operating point (`Scenario.linearize`)."""
 
 PLUGINS = {
     "library": {

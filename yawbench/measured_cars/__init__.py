@@ -1,4 +1,9 @@
-"""Measured cars: flaws of recordings, fits of parameters, validation."""
+"""Measured cars: flaws of recordings, fits of parameters, validation of runs.
+
+`yawbench measured`, `fit` and `validate`, their files, pages and public names.
+
+Not here: reading recordings (`yawbench.orchestrator.recordings`).
+"""
 
 PLUGINS = {
     "command": {

@@ -1,4 +1,8 @@
-"""Rankings of controllers under many conditions, and by threats that are turned up."""
+"""Rankings of controllers under many conditions, and by threats that are turned up.
+
+`ranking*` is the matrix of conditions, `threat*` the search for the highest level survived. Files
+`ranking.yaml` and `threats.yaml`, runs, scores, tables, pages, `yawbench rank` and `yb.rank`.
+"""
 
 PLUGINS = {
     "command": {"rank": "yawbench.ranking.command:rank"},

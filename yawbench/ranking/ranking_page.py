@@ -30,17 +30,19 @@ from yawbench.studies.tables import Table
 
 from .ranking import SERIES, EntrySpec
 from .ranking_scores import (
+    IDLE,
     Digits,
     EntryScore,
     RankedState,
     RankingCell,
     RankingResult,
+    apart_by_conditions,
     deciding_digits,
-    told_apart,
 )
 from .ranking_tables import (
     RULE,
     UNITS,
+    apart_sentence,
     degrees,
     interval_words,
     place_words,
@@ -55,6 +57,7 @@ from .ranking_tables import (
 from .threat_runs import published_result
 from .threat_scores import scored
 from .threats import load_threats
+from .threats_page import told_apart
 
 STATES = {
     RankedState.PASSED: "passed",
@@ -64,8 +67,6 @@ STATES = {
 }
 SHOWN = ("yaw_rate", "sideslip", "steering_wheel_angle", "yaw_moment", "acceleration_y")
 """Signals of a cell's worst run; chosen: what the test judges and what the controller does."""
-IDLE = "controller_off"
-"""FMU of the car without control."""
 OTHERS = ("speed_lost", "intervention", "chatter")
 """Numbers of a cell shown in addition to headroom and sideslip."""
 
@@ -197,18 +198,17 @@ def answer(ranked: RankingResult) -> str:
     others += [score for score in placed if score.spec.fmu == IDLE and score not in (*first, *others)]
     names = listed(in_text(score.spec.title) for score in first)
     rest = "".join(f", {in_text(score.spec.title)} {score.count(RankedState.PASSED)}" for score in others)
-    apart, pairs = told_apart(placed)
     best, whole = f"{first[0].count(RankedState.PASSED)} of {counted(number, 'condition')}", len(placed)
     if sharing > len(first):
         result = (
-            f"By the conditions passed, {sharing} of {counted(whole, 'controller')} cannot be told apart: "
-            f"their intervals overlap, so they share the first place. In the order, {names} "
+            f"By the conditions passed, {sharing} of {counted(whole, 'controller')} cannot be told apart and "
+            f"share the first place. In the order, {names} "
             f"{'comes' if len(first) == 1 else 'come'} first with {best} passed{rest}."
         )
     else:
         is_best = "is best" if len(first) == 1 else "are best"
         result = f"Of {counted(whole, 'controller')}, {names} {is_best}: {best} passed{rest}."
-    surely = f"The difference of two is clear in {apart} of {counted(pairs, 'pair')}." if pairs else ""
+    surely = apart_sentence(apart_by_conditions(placed), [score.spec.fmu == IDLE for score in placed])
     quoted = ranked.ranking.spec.threat_file
     threats = result_of_threats(ranked.ranking.path.parent / quoted) if quoted else ""
     return " ".join(filter(None, (result, surely, threats)))
@@ -227,9 +227,8 @@ def result_of_threats(file: Path) -> str:
     table = scored(result)
     sharing = sum(score.place == 1 for score in table.scores)
     return (
-        f"By threats turned up until the car is lost (published levels) it is clear in {table.told_apart} of "
-        f"{counted(table.pairs, 'pair')}, and {counted(sharing, 'controller')} "
-        f"{'is first' if sharing == 1 else 'share the first place'}."
+        f"By threats turned up until the car is lost (published levels) {counted(sharing, 'controller')} "
+        f"{'is first' if sharing == 1 else 'share the first place'}. {told_apart(table)}"
     )
 
 

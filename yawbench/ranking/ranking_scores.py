@@ -5,9 +5,10 @@ turns round though its yaw-rate ratio may meet them. A condition is passed if al
 
 Controllers are ordered by the number of conditions passed; ties by the share of runs that pass, then by the
 peak sideslip, both averaged over conditions. A controller with missing runs is not ranked. The conditions are
-a sample of those that a car meets: the interval of the number passed is that of a bootstrap that draws
-conditions. A place is one more than the number of controllers whose whole interval lies above, and never
-better than that of a controller earlier in the order; so those that cannot be told apart share it.
+a sample of those that a car meets: the interval of the number passed is Clopper and Pearson's. Two
+controllers are told apart by an exact sign test over the conditions that one of them passes alone, corrected
+for the number of pairs (Holm). A place is one more than the number of controllers that are clearly better,
+and never better than that of a controller earlier in the order; so those that cannot be told apart share it.
 
 `run_ranking` executes a ranking: first the runs for the angle A of every car, then all runs still missing.
 """
@@ -30,11 +31,12 @@ from yawbench.proving_ground.sine_with_dwell import FROM, RATIOS, SLIGHT, SPUN
 from yawbench.studies.confidence import (
     Bounds,
     ConfidenceInterval,
-    bootstrap,
+    ToldApart,
     interval,
-    pairs_apart,
-    percentile_bounds,
+    share_bounds,
     shared_places,
+    sign_test,
+    told_apart,
 )
 from yawbench.studies.executor import Executor
 from yawbench.studies.experiment_result import ExperimentResult
@@ -51,10 +53,12 @@ from .ranking import (
 )
 
 if TYPE_CHECKING:
-    import numpy as np
+    pass
 
 UNHELD = 1.0
 """Yaw-rate ratio without a second peak after the reversal: the car keeps turning as before."""
+IDLE = "controller_off"
+"""FMU of the car without control."""
 WORST = -100.0
 """Lower bound of the headroom, in percentage points; chosen: such a car is lost."""
 
@@ -329,28 +333,26 @@ def deciding_digits(ranked: Sequence[EntryScore]) -> Digits:
 def placed(every: Sequence[EntryScore]) -> list[EntryScore]:
     """Return the scores in order, with ranks, intervals and places."""
     whole = sorted((entry for entry in every if not entry.missing), key=lambda entry: entry.order)
-    lows, highs = percentile_bounds(_resampled(whole)) if whole else ((), ())
     ordered: list[EntryScore] = []
-    places = shared_places(lows, highs)
-    for number, (entry, place, low, high) in enumerate(zip(whole, places, lows, highs, strict=True), 1):
+    places = shared_places(apart_by_conditions(whole).better) if whole else []
+    for number, (entry, place) in enumerate(zip(whole, places, strict=True), 1):
         before = ordered[-1] if ordered else None
         rank = before.rank if before and before.order == entry.order else number
-        bounds = Bounds(float(low), float(high))
-        ordered.append(replace(entry, rank=rank, place=place, bounds=bounds))
+        conditions = len(entry.cells)
+        low, high = share_bounds(entry.count(RankedState.PASSED), conditions)
+        ordered.append(
+            replace(entry, rank=rank, place=place, bounds=Bounds(conditions * low, conditions * high))
+        )
     return ordered + [entry for entry in every if entry.missing]
 
 
-def _resampled(scores: Sequence[EntryScore]) -> np.ndarray:
-    """Return the number of conditions that each entry passes in resamples of them: shape (draws, entries)."""
+def apart_by_conditions(scores: Sequence[EntryScore]) -> ToldApart:
+    """Compare ranked entries, by exact tests over the conditions that only one of two passes."""
     import numpy as np
 
-    passed = np.array([[cell.passed for cell in score.cells.values()] for score in scores], dtype=float)
-    return bootstrap(lambda chosen: passed[:, chosen].sum(axis=-1).T, passed.shape[1:])
-
-
-def told_apart(scores: Sequence[EntryScore]) -> tuple[int, int]:
-    """Return how many pairs of ranked entries differ with one sign in 95 % of resamples, and of how many."""
-    return pairs_apart(_resampled([score for score in scores if score.place]))
+    passed = np.array([[cell.passed for cell in score.cells.values()] for score in scores], dtype=bool)
+    idle = next((k for k, score in enumerate(scores) if score.spec.fmu == IDLE), None)
+    return told_apart(passed.sum(axis=1), lambda i, j: sign_test(passed[i], passed[j]), idle)
 
 
 @dataclass(frozen=True)

@@ -7,12 +7,12 @@ threat, and threats count alike.
 
     score = 100 (m - m_none) / (m_best - m_none)            m: mean position of an entry
 
-so no control has 0 and the best 100. Intervals are percentiles of a bootstrap that draws threats and cars, in
-blocks; score and best are computed again in every draw. An entry's place is one more than the number of
-entries whose whole interval lies above its own, and never better than that of an entry with a higher score,
-so entries with overlapping intervals share places; `groups` counts how many intervals lie apart from each
-other. Differences between two entries are surer than their intervals say, as both face the same threats:
-`told_apart` counts pairs whose difference has one sign in 95 % of draws.
+so no control has 0 and the best 100. Two entries face the same threats and cars: what is sure is the interval
+of the mean of their differences, with threats and cars as samples both (`confidence.crossed_interval`). The
+interval beside a score is that of its distance from the best, in points of the score, with the best's gain
+taken as known. An entry is **clearly** better than another if the difference remains significant among those
+of all pairs (Holm). Its place is one more than the number of entries that are clearly better, and never
+better than that of an entry with a higher score, so entries that cannot be told apart share places.
 
 Mean ranks are a second order, which knows nothing of distances.
 """
@@ -28,14 +28,15 @@ import numpy as np
 
 from yawbench.studies import derived
 from yawbench.studies.confidence import (
-    DRAWS,
     TAIL,
     Bounds,
-    bootstrap,
-    pairs_apart,
-    percentile_bounds,
-    resample,
+    ToldApart,
+    crossed_interval,
+    crossed_probability,
+    holm,
+    jackknife,
     shared_places,
+    told_apart,
 )
 from yawbench.studies.tables import Table, column
 
@@ -57,21 +58,12 @@ def mean_positions(positions: np.ndarray) -> np.ndarray:
 
 
 def scores_of_positions(positions: np.ndarray, reference: int) -> np.ndarray:
-    """Return the scores of all entries, in each draw if there are several; `reference`: index of none."""
+    """Return the scores of all entries; `reference`: index of none."""
     means = mean_positions(positions)
     gained = means - means[..., [reference]]
     best = gained.max(axis=-1, keepdims=True)
     scores: np.ndarray = np.divide(100.0 * gained, best, out=np.zeros_like(gained), where=best > 0.0)
     return scores
-
-
-def resampled_scores(positions: np.ndarray, reference: int, draws: int = DRAWS) -> np.ndarray:
-    """Return the scores of all entries in draws of threats and cars; shape (draws, entries)."""
-
-    def draw(threats: np.ndarray, cars: np.ndarray) -> np.ndarray:
-        return scores_of_positions(resample(positions, None, threats, cars), reference)
-
-    return bootstrap(draw, positions.shape[1:], draws=draws)
 
 
 def mean_ranks(positions: np.ndarray) -> np.ndarray:
@@ -93,12 +85,11 @@ class ThreatScore:
 
     entry: str
     score: float
-    bounds: Bounds
+    bounds: Bounds  # of its distance from the best score
     place: int
     mean: float  # position
     mean_rank: float
     by_rank: int  # place by the mean rank
-    best: float  # share of the draws in which it has the best score
 
 
 @dataclass(frozen=True)
@@ -106,9 +97,12 @@ class ScoreTable:
     """Scores of all entries, the best first, and who can be told apart."""
 
     scores: list[ThreatScore]
-    groups: int  # largest number of intervals of which no two overlap
-    pairs: int
-    told_apart: int  # pairs whose difference has one sign in 95 % of draws
+    apart: ToldApart  # in their order
+
+    def behind(self, entry: str) -> list[str]:
+        """Return the entries that an entry is clearly better than."""
+        order = self.order()
+        return [order[k] for k in np.flatnonzero(self.apart.better[order.index(entry)])]
 
     def order(self) -> list[str]:
         """Return the entries, the best first."""
@@ -119,37 +113,43 @@ class ScoreTable:
         return {score.entry: score.score for score in self.scores}
 
 
-def score_table(
-    entries: Sequence[str], positions: np.ndarray, reference: str, *, draws: int = DRAWS
-) -> ScoreTable:
+def score_table(entries: Sequence[str], positions: np.ndarray, reference: str) -> ScoreTable:
     """Return the scores of entries with intervals and places.
 
     Args:
         entries: their names.
         positions: array of entry, threat, car; NaN where a car does not drive a threat.
         reference: the entry without control.
-        draws: resamples of the bootstrap.
     """
     none = entries.index(reference)
-    scores, ranks = scores_of_positions(positions, none), mean_ranks(positions)
-    resampled = resampled_scores(positions, none, draws)
-    low, high = percentile_bounds(resampled)
+    scores, ranks, means = (
+        scores_of_positions(positions, none),
+        mean_ranks(positions),
+        mean_positions(positions),
+    )
     order = order_of(scores)
-    places = shared_places(low[order], high[order])
-    leaders = np.bincount(resampled.argmax(axis=1), minlength=len(entries)) / len(resampled)
+    best = order[0]
+    gain = means[best] - means[none]
+    half = [
+        100.0 * crossed_interval(table - positions[best]).half / gain if gain else 0.0 for table in positions
+    ]
+    apart = told_apart(means, lambda i, j: crossed_probability(positions[i] - positions[j]), none).of(order)
     by_rank = {i: place for place, i in enumerate(order_of(-ranks), start=1)}
-    means = mean_positions(positions)
-    apart, pairs = pairs_apart(resampled)
     return ScoreTable(
         [
             ThreatScore(
-                entries[i], float(scores[i]), Bounds(float(low[i]), float(high[i])), place,
-                float(means[i]), float(ranks[i]), by_rank[i], float(leaders[i]),
+                entries[i],
+                float(scores[i]),
+                Bounds(float(scores[i] - half[i]), float(scores[i] + half[i])),
+                place,
+                float(means[i]),
+                float(ranks[i]),
+                by_rank[i],
             )
-            for i, place in zip(order, places, strict=True)
+            for i, place in zip(order, shared_places(apart.better), strict=True)
         ],
-        groups_of(list(zip(low, high, strict=True))), pairs, apart,
-    )  # fmt: skip
+        apart,
+    )
 
 
 def table_of_scores(table: ScoreTable) -> Table:
@@ -161,7 +161,6 @@ def table_of_scores(table: ScoreTable) -> Table:
         "high": [row.bounds.high for row in rows],
         "mean_position": [row.mean for row in rows],
         "mean_rank": [row.mean_rank for row in rows],
-        "best_in_draws": [row.best for row in rows],
     }
     return Table.of_columns(
         [
@@ -170,15 +169,6 @@ def table_of_scores(table: ScoreTable) -> Table:
             *(column(name, "float64", values) for name, values in numbers.items()),
         ]
     )
-
-
-def groups_of(bounds: Sequence[tuple[float, float]]) -> int:
-    """Return the largest number of intervals of which no two overlap."""
-    number, end = 0, -np.inf
-    for low, high in sorted(bounds, key=lambda interval: interval[1]):
-        if low > end:
-            number, end = number + 1, high
-    return number
 
 
 def scores_without(
@@ -246,57 +236,77 @@ class Spread(NamedTuple):
 
 @dataclass(frozen=True)
 class GainsAndLaws:
-    """Spread of the mean positions by gains and by laws.
+    """Spread of the mean positions by gains and by laws, on the threats and cars that were driven.
 
     `laws`, `seeds`: of laws tuned with several seeds, the standard deviation between laws and that of the
-    luck of the search within them, components of variance; `ratio`: laws / seeds. `gains`: between authors'
-    and tuned gains of a law; `between`: between the means of laws over both. `difference`: gains - between;
-    gains matter more than laws if its interval is above 0.
+    luck of the search within them, components of variance; `ratio`: laws / seeds, whose interval lies above 0
+    if laws differ by more than that luck, as the test by F = `f`, with `degrees` of freedom, says. `gains`:
+    between authors' and tuned gains of a law; `between`: between the means of laws over both. `difference`:
+    gains - between; gains matter more than laws if its interval is above 0. It rests on the laws `resting`:
+    without these, which gain most by tuning, it is not above 0 any more; empty if it never is.
     """
 
-    laws: Spread
+    laws: float
     seeds: Spread
     ratio: Spread
+    f: float
+    degrees: tuple[int, int]
     gains: Spread
     between: Spread
     difference: Spread
+    resting: tuple[int, ...]
 
 
 def gains_and_laws(tuned: np.ndarray, authors: np.ndarray) -> GainsAndLaws:
     """Compare spreads of laws, seeds of their search, and gains.
 
     Args:
-        tuned: positions of law, seed, threat, car.
-        authors: positions of law, threat, car, with the authors' gains.
+        tuned: mean positions of law and seed.
+        authors: mean positions of laws, with the authors' gains.
 
-    Intervals are of a bootstrap over threats, cars, and laws, which are a sample of those that could be
-    compared. That of `ratio` is exact for normally distributed laws and seeds on these threats and cars.
+    Laws are a sample of those that could be compared, threats and cars are those driven. The intervals of
+    seeds and ratio are exact for normally distributed laws and seeds, the others of a jackknife over laws.
     """
-    laws, seeds = tuned.shape[:2]
+    laws, seeds = tuned.shape
+    means, within = tuned.mean(axis=1), tuned.var(axis=1, ddof=1)
 
-    def spreads(some: np.ndarray, threats: np.ndarray, cars: np.ndarray) -> np.ndarray:
-        of_seeds = mean_positions(resample(tuned, some, None, threats, cars))
-        own = mean_positions(resample(authors, some, threats, cars))
-        means = of_seeds.mean(axis=-1)
-        within = of_seeds.var(axis=-1, ddof=1).mean(axis=-1)
-        between = means.var(axis=-1, ddof=1) - within / seeds
-        of_gains = np.sqrt((0.5 * (means - own) ** 2).mean(axis=-1))
-        variance = (0.5 * (means + own)).var(axis=-1, ddof=1) - 0.25 * within / seeds
-        of_laws = np.sqrt(np.maximum(0.0, variance))
-        spread = np.sqrt(np.maximum(0.0, between))
-        return np.stack([spread, np.sqrt(within), of_gains, of_laws, of_gains - of_laws], axis=-1)
+    def spreads(some: np.ndarray) -> np.ndarray:
+        of_gains = math.sqrt(float((0.5 * (means[some] - authors[some]) ** 2).mean()))
+        both = float((0.5 * (means + authors)[some]).var(ddof=1)) - 0.25 * float(within[some].mean()) / seeds
+        of_laws = math.sqrt(max(0.0, both))
+        return np.array([of_gains, of_laws, of_gains - of_laws])
 
-    sizes = (laws, *tuned.shape[2:])
-    (whole,) = spreads(*(np.arange(n)[np.newaxis] for n in sizes))
-    draws = percentile_bounds(bootstrap(spreads, sizes))
-    of_laws, of_seeds, *of_gains = (
-        Spread(float(x), Bounds(*map(float, b))) for x, b in zip(whole, draws.T, strict=True)
-    )
-    return GainsAndLaws(of_laws, of_seeds, ratio_of_spreads(mean_positions(tuned)), *of_gains)
+    def over(some: np.ndarray) -> list[Spread]:
+        values, halves = jackknife(lambda chosen: spreads(some[chosen]), len(some))
+        pairs = zip(map(float, values), map(float, halves), strict=True)
+        return [Spread(value, Bounds(value - half, value + half)) for value, half in pairs]
+
+    of_gains, between, difference = over(np.arange(laws))
+    by_gain = np.argsort(-np.abs(means - authors), kind="stable")
+    resting: tuple[int, ...] = ()
+    if difference.bounds.low > 0.0:
+        left_out = (n for n in range(1, laws - 2) if over(np.sort(by_gain[n:]))[2].bounds.low <= 0.0)
+        resting = tuple(int(k) for k in by_gain[: next(left_out, 0)])
+    ratio, f = ratio_of_spreads(tuned)
+    of_seeds = spread_within(tuned)
+    return GainsAndLaws(
+        ratio.value * of_seeds.value if of_seeds.value else float(means.std(ddof=1)),
+        of_seeds, ratio, f, (laws - 1, laws * (seeds - 1)), of_gains, between, difference, resting,
+    )  # fmt: skip
 
 
-def ratio_of_spreads(groups: np.ndarray) -> Spread:
-    """Return the standard deviation between groups over that within them, with its interval.
+def spread_within(groups: np.ndarray) -> Spread:
+    """Return the standard deviation within groups, shape (groups, n), with its interval by chi square."""
+    from scipy.special import chdtri
+
+    degrees = groups.shape[0] * (groups.shape[1] - 1)
+    value = math.sqrt(float(groups.var(axis=1, ddof=1).mean()))
+    low, high = (value * math.sqrt(degrees / float(chdtri(degrees, tail))) for tail in (TAIL, 1.0 - TAIL))
+    return Spread(value, Bounds(low, high))
+
+
+def ratio_of_spreads(groups: np.ndarray) -> tuple[Spread, float]:
+    """Return the standard deviation between groups over that within them, with its interval, and F.
 
     Components of variance of a balanced one-way analysis: F is the mean square between groups over that
     within, (1 + n ratio^2) times a number that follows the F distribution.
@@ -311,11 +321,11 @@ def ratio_of_spreads(groups: np.ndarray) -> Spread:
     number, n = groups.shape
     within = float(groups.var(axis=1, ddof=1).mean())
     if within == 0.0:
-        return Spread(math.inf, Bounds(math.inf, math.inf))
+        return Spread(math.inf, Bounds(math.inf, math.inf)), math.inf
     observed = n * float(groups.mean(axis=1).var(ddof=1)) / within
     quantiles = fdtri(number - 1, number * (n - 1), [1.0 - TAIL, TAIL])
     value, low, high = (math.sqrt(max(0.0, observed / q - 1.0) / n) for q in (1.0, *map(float, quantiles)))
-    return Spread(value, Bounds(low, high))
+    return Spread(value, Bounds(low, high)), observed
 
 
 def scored(result: ThreatResult, setting: str = "") -> ScoreTable:
@@ -359,11 +369,17 @@ class ComparedGains:
         setting: its name.
         means: law, by its entry with the studies' gains -> mean position with these, and with each seed.
         groups: title of a group of laws -> spreads; all laws first.
+        laws: title of a group -> its laws, in the order of its spreads.
+        helped: law -> probability of a difference as large between its tuned gains, means over seeds, and
+            those of the study, if they are alike: first taken alone, then corrected for the number of laws.
+            Only laws whose tuned gains are better.
     """
 
     setting: str
     means: dict[str, list[float]]
     groups: dict[str, GainsAndLaws]
+    laws: Mapping[str, Sequence[str]]
+    helped: dict[str, tuple[float, float]]
 
 
 def compared_gains(result: ThreatResult) -> ComparedGains | None:
@@ -386,16 +402,20 @@ def compared_gains(result: ThreatResult) -> ComparedGains | None:
     groups = {f"all {len(laws)} laws": [*laws], **spec.groups}
     tuned_positions = {name: result.positions(setting, others) for name, others in laws.items()}
     studies = {name: result.positions(threats.main, [name], like=setting) for name in laws}
-    compared = {
-        title: gains_and_laws(
-            np.array([tuned_positions[name] for name in names]),
-            np.concatenate([studies[name] for name in names]),
-        )
-        for title, names in groups.items()
-        if len(names) >= FEWEST and {*names} <= {*laws}
-    }
     means = {
         name: [float(x) for x in mean_positions(np.concatenate([studies[name], tuned_positions[name]]))]
         for name in laws
     }
-    return ComparedGains(setting, means, compared) if compared else None
+    kept = {title: names for title, names in groups.items() if len(names) >= FEWEST and {*names} <= {*laws}}
+    compared = {}
+    for title, names in kept.items():
+        table = np.array([means[name] for name in names])
+        compared[title] = gains_and_laws(table[:, 1:], table[:, 0])
+    gained = {name: tuned_positions[name].mean(axis=0) - studies[name][0] for name in laws}
+    alone = [crossed_probability(table) for table in gained.values()]
+    helped = {
+        name: both
+        for name, both in zip(laws, zip(alone, holm(alone), strict=True), strict=True)
+        if np.nanmean(gained[name]) > 0.0
+    }
+    return ComparedGains(setting, means, compared, kept, helped) if compared else None

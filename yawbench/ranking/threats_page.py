@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -16,7 +17,7 @@ from yawbench.reports.page_parts import PAGE, RANKING, Page, render
 from yawbench.studies.confidence import Bounds
 from yawbench.studies.tables import Table
 
-from .ranking_tables import gains_sentence, gains_table, seeds_table
+from .ranking_tables import apart_sentence, gains_sentence, gains_table, seeds_table
 from .threat_runs import ThreatResult
 from .threat_scores import (
     Moves,
@@ -32,12 +33,13 @@ from .threats import LANE_CHANGE, REFERENCE, LoadedThreats, SearchPlace, ThreatS
 
 RULE = (
     "Score: the geometric mean of the highest levels survived, over threats and cars, each threat's range "
-    "taken as one unit; no control has 0, the best 100. Interval: 95 %, threats and cars drawn in blocks; "
-    "best: draws in which it has the best score. Place: one more than the entries whose whole interval lies "
-    "above, never better than that of a higher score. Order by rank: by the mean rank."
+    "taken as one unit; no control has 0, the best 100. Interval: 95 %, of the distance from the best, which "
+    "faces the same threats and cars, with these as samples. Place: one more than the entries that are "
+    "clearly better by such differences, corrected for the number of pairs, and never better than that of a "
+    "higher score. Order by rank: by the mean rank."
 )
-GROUPS = 8
-"""Intervals that lie apart, from which on scores are said to tell entries apart; chosen."""
+FROM_BEST = "95 % interval, from the best"
+"""Heading of the intervals of scores."""
 
 
 def titles_of(result: ThreatResult) -> dict[str, str]:
@@ -45,9 +47,9 @@ def titles_of(result: ThreatResult) -> dict[str, str]:
     return {name: spec.title for name, (spec, _) in result.threats.ranking.entries.items()}
 
 
-def interval_text(bounds: Bounds) -> str:
-    """Return an interval of scores."""
-    return f"{bounds.low:.0f} to {bounds.high:.0f}"
+def interval_text(bounds: Bounds) -> str | None:
+    """Return an interval of scores; None if a single level tells none."""
+    return f"{bounds.low:.0f} to {bounds.high:.0f}" if math.isfinite(bounds.high) else None
 
 
 def main_table(result: ThreatResult, table: ScoreTable) -> Table:
@@ -57,15 +59,14 @@ def main_table(result: ThreatResult, table: ScoreTable) -> Table:
     rows = [
         [
             str(score.place), titles[score.entry] + (" (published)" if score.entry in published else ""),
-            f"{score.score:.1f}", interval_text(score.bounds), f"{100 * score.best:.0f}",
-            f"{score.mean_rank:.1f}", str(score.by_rank),
+            f"{score.score:.1f}", interval_text(score.bounds), f"{score.mean_rank:.1f}", str(score.by_rank),
         ]
         for score in table.scores
     ]  # fmt: skip
     return Table(
         f"Scores: {result.threats.spec.settings[result.threats.main].title}",
-        ["place", "controller", "score", "95 % interval", "best [% of draws]", "mean rank", "order by rank"],
-        [*rows], [RULE, _other_order(titles, table), told_apart(table)], {0, 2, 4, 5, 6},
+        ["place", "controller", "score", FROM_BEST, "mean rank", "order by rank"],
+        [*rows], [RULE, _other_order(titles, table), told_apart(table)], {0, 2, 4, 5},
     )  # fmt: skip
 
 
@@ -94,19 +95,9 @@ def answer(result: ThreatResult, table: ScoreTable) -> str:
         best = in_text(titles[first[0].entry])
         who = (
             f"{len(first)} share the first place with scores from {first[-1].score:.0f} to "
-            f"{first[0].score:.0f}, as their intervals overlap; {best} has the best score"
+            f"{first[0].score:.0f}, as no other is clearly better; {best} has the best score"
         )
-    apart = f"{table.groups} of their 95 % intervals lie apart from each other"
-    if table.groups < GROUPS:
-        width = float(np.median([score.bounds.high - score.bounds.low for score in table.scores]))
-        apart = (
-            f"Scores alone hardly tell them apart: an interval is {width:.0f} points wide (median), and no "
-            f"more than {apart}"
-        )
-    return (
-        f"Of {counted(len(table.scores), 'controller')}, {who}. {apart}. As all face the same threats, the "
-        f"difference of two is surer: its sign is clear in {table.told_apart} of {table.pairs} pairs."
-    )
+    return f"Of {counted(len(table.scores), 'controller')}, {who}. {told_apart(table)}"
 
 
 def _published(result: ThreatResult, order: Sequence[str]) -> str:
@@ -118,11 +109,8 @@ def _published(result: ThreatResult, order: Sequence[str]) -> str:
 
 
 def told_apart(table: ScoreTable) -> str:
-    """Return how many entries can be told apart, in a sentence."""
-    return (
-        f"{table.groups} of {len(table.scores)} intervals do not overlap. Of {table.pairs} pairs, "
-        f"{table.told_apart} differ by the interval of their difference."
-    )
+    """Return which entries can be told apart, in sentences."""
+    return apart_sentence(table.apart, [entry == REFERENCE for entry in table.order()])
 
 
 def level_text(spec: ThreatSpec, position: float, end: str = "") -> str:
@@ -270,7 +258,7 @@ def setting_table(result: ThreatResult, setting: str) -> Table:
         f"Threats: {', '.join(threats.threats_in(setting))}; cars: {', '.join(threats.cars_in(setting))}. "
         f"{told_apart(compared.table)}"
     )
-    headings = ["place", "controller", "score", "95 % interval", "main score, same threats", "main order"]
+    headings = ["place", "controller", "score", FROM_BEST, "main score, same threats", "main order"]
     return Table(threats.spec.settings[setting].title, headings, [*rows], [about], {0, 2, 4, 5})
 
 
@@ -362,7 +350,7 @@ def discipline_table(result: ThreatResult, discipline: Discipline) -> Table:
         ]
         for score in discipline.scores.scores
     ]  # fmt: skip
-    headings = ["place", "controller", "score", "95 % interval", *discipline.headings]
+    headings = ["place", "controller", "score", FROM_BEST, *discipline.headings]
     notes = [f"{discipline.about} {told_apart(discipline.scores)}"]
     return Table(discipline.title, headings, [*rows], notes, {0, 2, *range(4, len(headings))})
 
@@ -381,8 +369,8 @@ def overview(result: ThreatResult, table: ScoreTable) -> Table:
             cells.append(f"{own.score:.0f} ({own.place})" if own else None)
         rows.append([titles[score.entry], *cells])
     notes = [
-        "Conditions of the matrix passed, as published; then scores, in brackets places, shared where "
-        "intervals overlap. No control has 0, the best 100; below 0 is worse than no control."
+        "Conditions of the matrix passed, as published; then scores, in brackets places, shared by "
+        "those that cannot be told apart. No control has 0, the best 100; below 0 is worse than no control."
     ]
     if driven:
         agreements = (
@@ -474,7 +462,7 @@ def threats_page(result: ThreatResult, table: ScoreTable, folder: Path, command:
         moves=settings_table(result, others),
         settings=[setting_table(result, name) for name in others],
         gains=[gains_table(result, gains), seeds_table(result, gains)] if gains else [],
-        sentence=gains_sentence(gains) if gains else "",
+        sentence=gains_sentence(result, gains) if gains else "",
         overview=overview(result, table),
         disciplines=[discipline_table(result, discipline) for discipline in disciplines(result)],
         cars=car_tables(result, order),

@@ -1,4 +1,4 @@
-"""Confidence intervals of means over repeats, of shares and of any statistic; sequential tests of shares.
+"""Confidence intervals of means and shares; tests of pairs, and of shares while points are added.
 
 Means over repeats with different seeds (`interval`):
 
@@ -13,14 +13,31 @@ Shares, k of n (`share_bounds`): the shares p at which k or more, and k or fewer
 (1 - confidence) / 2, quantiles of the beta distribution. They contain the true share at least as often as
 stated.
 
-Other statistics (`bootstrap`): the statistic of resamples drawn with replacement. Data with several factors,
-such as cars and tests, are resampled in blocks: levels of each factor are drawn, whole rows and columns
-together, as numbers that share a car or a test are not independent. This tends to wide intervals.
+Means over two factors that are samples both, such as tests and cars (`crossed_interval`): numbers that
+share a test or a car are not independent, so the mean is as sure as its means over each factor:
 
-Sources: Student (W. S. Gosset), The probable error of a mean, Biometrika 6 (1908) 1-25. C. J. Clopper,
-E. S. Pearson, The use of confidence or fiducial limits illustrated in the case of the binomial, Biometrika
-26 (1934) 404-413. B. Efron, Bootstrap methods: another look at the jackknife, Annals of Statistics 7 (1979)
-1-26. A. B. Owen, The pigeonhole bootstrap, Annals of Applied Statistics 1 (2007) 386-411.
+    variance of the mean = s_1² / n_1 + s_2² / n_2      s_k: standard deviation of the means at the n_k levels
+                                                        of factor k
+    degrees of freedom   = variance² / sum of (s_k² / n_k)² / (n_k - 1)
+
+This counts the scatter that belongs to neither factor twice, and so covers at least as often as stated where
+that scatter is all there is: 94 to 99 % of intervals of 95 % hold the mean with 13 tests and 6 cars, and with
+4 and 3, of normally distributed numbers; 92 to 95 % of exponentially distributed ones (a simulation, which
+the tests repeat). Percentiles of a bootstrap hold it in 82 to 90 % with 4 tests and 3 cars.
+
+Two series of outcomes, passed or not, under the same conditions (`sign_test`): the conditions that only one
+passes are a fair coin if neither is better. Of many comparisons some are clear by chance; `holm` corrects for
+that. A statistic of a sample that is no mean, such as a standard deviation (`jackknife`): from its values
+without each member.
+
+Sources: Student (W. S. Gosset), The probable error of a mean, Biometrika 6 (1908) 1-25. C. J. Clopper, E. S.
+Pearson, The use of confidence or fiducial limits illustrated in the case of the binomial, Biometrika 26
+(1934) 404-413. F. E. Satterthwaite, An approximate distribution of estimates of variance components,
+Biometrics Bulletin 2 (1946) 110-114. H. H. Clark, The language-as-fixed-effect fallacy, Journal of Verbal
+Learning and Verbal Behavior 12 (1973) 335-359, whose min F' is the same test. Q. McNemar, Note on the
+sampling error of the difference between correlated proportions, Psychometrika 12 (1947) 153-157. S. Holm, A
+simple sequentially rejective multiple test procedure, Scandinavian Journal of Statistics 6 (1979) 65-70. J.
+W. Tukey, Bias and confidence in not quite large samples, Annals of Mathematical Statistics 29 (1958) 614.
 """
 
 from __future__ import annotations
@@ -29,8 +46,8 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum
-from functools import cache, cached_property, lru_cache
-from itertools import accumulate
+from functools import cache, cached_property
+from itertools import accumulate, combinations
 from typing import NamedTuple
 
 import numpy as np
@@ -39,11 +56,6 @@ CONFIDENCE = 0.95
 """Share of intervals that contain the true mean; chosen: the usual one."""
 TAIL = 0.5 * (1.0 - CONFIDENCE)
 """Probability of each side of an interval, and of a wrong decision on one side."""
-DRAWS = 2000
-"""Resamples of a bootstrap. Chosen: bounds of 95 % then repeat within a few per cent of their distance."""
-
-BATCH = 100
-"""Resamples at a time. Chosen: few calls, and no more than some megabytes."""
 
 
 class ConfidenceInterval(NamedTuple):
@@ -78,7 +90,7 @@ def interval(numbers: Sequence[float]) -> ConfidenceInterval | None:
 
 
 @cache
-def _quantile(degrees: int) -> float:
+def _quantile(degrees: float) -> float:
     """Return the quantile of Student's distribution that leaves (1 - CONFIDENCE) / 2 in each tail."""
     from scipy.special import stdtrit  # what scipy.stats.t uses, without its slow import
 
@@ -106,68 +118,129 @@ def share_bounds(count: int, number: int, confidence: float = CONFIDENCE) -> Bou
     return Bounds(low, high)
 
 
-def bootstrap(
-    statistic: Callable[..., np.ndarray], sizes: Sequence[int], *, draws: int = DRAWS
-) -> np.ndarray:
-    """Return a statistic of resamples, an array of `draws` rows; the same data give the same resamples.
+def crossed_interval(table: np.ndarray) -> ConfidenceInterval:
+    """Return the mean over two crossed factors, both samples, with its interval.
 
     Args:
-        statistic: called with an array of indices for each factor, drawn with replacement, a row for each
-            draw of a batch; it returns a row for each.
-        sizes: the number of levels of each factor; a single one for independent numbers.
-        draws: resamples.
+        table: numbers by the levels of the factors, shape (n_1, n_2); NaN: not known. Levels of the first
+            factor count alike. A factor with a single level is none.
+
+    The half width is infinite for a single number.
     """
-    drawn = _drawn(tuple(sizes), draws)
-    batches = range(0, draws, BATCH)
-    return np.concatenate([statistic(*(rows[k : k + BATCH] for rows in drawn)) for k in batches])
+    mean, variance, degrees = _crossed(table)
+    return ConfidenceInterval(mean, _quantile(degrees) * math.sqrt(variance) if degrees else math.inf)
 
 
-@lru_cache(maxsize=8)
-def _drawn(sizes: tuple[int, ...], draws: int) -> list[np.ndarray]:
-    """Return the indices drawn of each factor, a row for each draw."""
-    chance = np.random.default_rng(1)
-    rows = [[chance.integers(n, size=n) for n in sizes] for _ in range(draws)]
-    drawn = [np.array(factor) for factor in zip(*rows, strict=True)]
-    for factor in drawn:
-        factor.flags.writeable = False
-    return drawn
+def crossed_probability(table: np.ndarray) -> float:
+    """Return the probability of a mean over two crossed factors as far from 0, if the true one is 0."""
+    from scipy.special import stdtr
+
+    mean, variance, degrees = _crossed(table)
+    if not degrees or (variance == 0.0 and mean == 0.0):
+        return 1.0
+    return 2.0 * float(stdtr(degrees, -abs(mean) / math.sqrt(variance))) if variance else 0.0
 
 
-def resample(table: np.ndarray, *drawn: np.ndarray | None) -> np.ndarray:
-    """Return resamples of a table, the first axis a row for each draw.
+def _crossed(table: np.ndarray) -> tuple[float, float, float]:
+    """Return mean, its variance and degrees of freedom, 0 for a single number."""
+    rows = np.nanmean(table, axis=1)
+    mean = float(np.mean(rows))
+    columns = mean + np.nanmean(table - rows[:, np.newaxis], axis=0)
+    parts = [(float(np.var(x, ddof=1)) / len(x), len(x) - 1) for x in (rows, columns) if len(x) > 1]
+    variance = sum(part for part, _ in parts)
+    if not variance:
+        return mean, 0.0, float(max((number for _, number in parts), default=0))
+    return mean, variance, variance**2 / sum(part**2 / number for part, number in parts)
+
+
+def sign_test(first: np.ndarray, second: np.ndarray) -> float:
+    """Return the exact probability of outcomes that differ as much, if neither series is better.
 
     Args:
-        table: the numbers.
-        drawn: for each axis of the table, the indices drawn, a row for each draw; None keeps the axis.
+        first, second: whether each passes, under the same conditions.
     """
-    indices = []
-    for axis, rows in enumerate(drawn):
-        rows = np.arange(table.shape[axis])[np.newaxis] if rows is None else rows
-        indices.append(rows.reshape(len(rows), *(-1 if k == axis else 1 for k in range(table.ndim))))
-    resampled: np.ndarray = table[tuple(indices)]
-    return resampled
+    from scipy.special import bdtr
+
+    wins, losses = int(np.sum(first & ~second)), int(np.sum(second & ~first))
+    return min(1.0, 2.0 * float(bdtr(min(wins, losses), wins + losses, 0.5))) if wins + losses else 1.0
 
 
-def percentile_bounds(samples: np.ndarray) -> np.ndarray:
-    """Return the quantiles that leave (1 - CONFIDENCE) / 2 of resamples in each tail: low and high rows."""
-    bounds: np.ndarray = np.quantile(samples, [0.5 - 0.5 * CONFIDENCE, 0.5 + 0.5 * CONFIDENCE], axis=0)
-    return bounds
+def holm(probabilities: Sequence[float]) -> list[float]:
+    """Return probabilities corrected for their number: any is below 5 % by chance in 5 % of such lists."""
+    order = sorted(range(len(probabilities)), key=probabilities.__getitem__)
+    corrected, largest = [1.0] * len(probabilities), 0.0
+    for before, k in enumerate(order):
+        largest = max(largest, min(1.0, (len(order) - before) * probabilities[k]))
+        corrected[k] = largest
+    return corrected
 
 
-def shared_places(lows: Sequence[float], highs: Sequence[float]) -> list[int]:
-    """Return places, from the bounds of intervals, the best first: those that overlap may share a place.
+@dataclass(frozen=True)
+class ToldApart:
+    """Pairs of members that their numbers tell apart.
 
-    A place is one more than the intervals that lie wholly above, and never better than that before it.
+    Attributes:
+        better: square array, true at [i, j] if i is clearly better than j, corrected for the number of pairs.
+        alone: the same, with every pair as if it were the only one.
     """
-    places = (1 + sum(bool(low > high) for low in lows) for high in highs)
+
+    better: np.ndarray
+    alone: np.ndarray
+
+    def of(self, order: Sequence[int]) -> ToldApart:
+        """Return the same of some members in another order."""
+        return ToldApart(self.better[np.ix_(order, order)], self.alone[np.ix_(order, order)])
+
+
+def told_apart(
+    numbers: Sequence[float] | np.ndarray,
+    probability: Callable[[int, int], float],
+    baseline: int | None = None,
+) -> ToldApart:
+    """Compare all pairs of members.
+
+    Args:
+        numbers: of the members, larger is better.
+        probability: of the difference between two members, if neither is better.
+        baseline: one with which the others are compared. Whether a member is better than it, and which of two
+            others is better, are two questions: each is corrected for the number of its own pairs.
+    """
+    alone = np.zeros((len(numbers), len(numbers)), dtype=bool)
+    better = alone.copy()
+    pairs = list(combinations(range(len(numbers)), 2))
+    for with_baseline in (True, False):
+        asked = [pair for pair in pairs if (baseline in pair) is with_baseline]
+        each = [probability(*pair) for pair in asked]
+        for found, probabilities in ((alone, each), (better, holm(each))):
+            for (i, j), p in zip(asked, probabilities, strict=True):
+                if p < 2.0 * TAIL:
+                    found[(i, j) if numbers[i] > numbers[j] else (j, i)] = True
+    return ToldApart(better, alone)
+
+
+def jackknife(statistic: Callable[[np.ndarray], np.ndarray], number: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return statistics of a sample and the half widths of their intervals.
+
+    Args:
+        statistic: called with indices of members of the sample.
+        number: of members.
+
+    For standard deviations of 8 to 10 members 80 to 97 % of the intervals of 95 % hold the truth, for
+    differences of two 91 to 96 % (a simulation with normal, exponential and mixed members).
+    """
+    everybody = np.arange(number)
+    without = np.array([statistic(np.delete(everybody, k)) for k in everybody])
+    spread = np.sqrt((number - 1) / number * np.sum((without - without.mean(axis=0)) ** 2, axis=0))
+    return statistic(everybody), _quantile(number - 1) * spread
+
+
+def shared_places(better: np.ndarray) -> list[int]:
+    """Return places, the best first; `better[i, j]`: whether i is clearly better than j.
+
+    A place is one more than the number of those clearly better, and never better than that before it.
+    """
+    places = (1 + int(number) for number in better.sum(axis=0))
     return list(accumulate(places, max))
-
-
-def pairs_apart(resampled: np.ndarray) -> tuple[int, int]:
-    """Return how many pairs of columns differ with one sign in 95 % of the rows, and of how many."""
-    number = resampled.shape[1]
-    ends = (percentile_bounds(resampled[:, [k]] - resampled[:, k + 1 :]) for k in range(number - 1))
-    return sum(int(np.sum((low > 0.0) | (high < 0.0))) for low, high in ends), math.comb(number, 2)
 
 
 class Decision(Enum):
