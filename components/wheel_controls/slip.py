@@ -4,8 +4,8 @@ The law is described in `control_laws.slip_control`. It needs the tyre's F_x(kap
 load and friction, which it evaluates with the functions of the tyre components. Its tyre parameters must be
 those of the tyre, as with a vehicle file in a scenario.
 
-`slip_share_*` tells whether a wheel keeps to (33) at this instant: its slip over the share of the optimum that
-it may have there, whatever is asked for.
+`slip_share_*` tells whether a wheel keeps to (33) at this instant: its slip over the share of the optimum
+that it may have there, whatever is asked for.
 
 Source: paper B, equations (31)-(38).
 """
