@@ -15,6 +15,7 @@ from . import (
     blind_tables,
     commands,
     evidence,
+    fuzzy_sets,
     library,
     matrix_tables,
     metrics,
@@ -40,6 +41,7 @@ PAGES: dict[str, Callable[[], str]] = {
     "reference/library.md": library.page,
     "trust.md": evidence.page,
     "reference/vehicles.md": vehicles.page,
+    "theory/paper_c_sets.svg": fuzzy_sets.figure,
 }
 """Path in the docs -> what returns its text."""
 PUBLISHED = (blind_tables, matrix_tables, monitor_tables, threat_tables)
