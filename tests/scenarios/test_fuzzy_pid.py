@@ -100,7 +100,7 @@ def test_the_gains_of_the_study_are_those_that_tuning_prefers(whole):
     for controller, law in (("pid", "PID"), ("fuzzy_pid", "fuzzy PID")):
         changes = whole["runs"][f"sine/{controller}_tuned"]["changes"]
         found = {one["place"]: one["value"] for one in changes if one["place"] != "controller"}
-        sought = {axis.vary[0]: axis for axis in spec.tuning.laws[law].axes.values()}
+        sought = {str(axis.vary[0]): axis for axis in spec.tuning.laws[law].axes.values()}
         assert set(found) == set(sought)
         assert all(axis.start <= found[place] <= axis.end for place, axis in sought.items())
 

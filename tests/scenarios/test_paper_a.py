@@ -255,7 +255,7 @@ def test_the_page_on_papers_tells_what_became_of_the_laws_with_motors_that_lag_a
             sought = load_experiment(STUDY.with_name(f"{file}.yaml")).spec.tuning.laws[name]
             given = {one["place"]: one["value"] for one in found["runs"][f"{runs}/15mps/{law}"]["changes"]}
             for axis in sought.axes.values():
-                assert axis.start <= given[axis.vary[0]] <= axis.end
+                assert axis.start <= given[str(axis.vary[0])] <= axis.end
 
 
 @pytest.mark.exhaustive
