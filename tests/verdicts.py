@@ -35,11 +35,12 @@ reproduce" are robust: with 95 % confidence less than 10 % of the region flips t
 is that of each claim, not of all together.
 
 The margin is how far a number is from the paper's bound at the values that we chose, in per cent of the
-bound: positive where the claim is true there, "by far" beyond 100 %. A claim that holds by 1 % is decided,
-but says little to an engineer. The region gives the number of points that flip the verdict, and the 95 %
-interval of the share; the nearest flip is the one open value that changes the verdict first, all others as
-chosen. [How far a verdict carries](regions.md) explains the runs; the ranges of the open values, and the
-reason for each, are in the study files and in `results/report.html`.
+bound: positive where the claim is true there, "by far" beyond 100 %. Where two runs are compared, a
+difference of less than 1 % counts as none, and the margin is what lies beyond. The region gives the number
+of points that flip the verdict, and the 95 % interval of the share; the nearest flip is the one open value
+that changes the verdict first, all others as chosen. [How far a verdict carries](regions.md) explains the
+runs; the ranges of the open values, and the reason for each, are in the study files and in
+`results/report.html`.
 
 *A test makes all these runs and checks this page.*
 """

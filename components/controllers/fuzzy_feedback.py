@@ -34,7 +34,7 @@ class FuzzyFeedbackParameters:
         "standard",
         None,
         "Rule table of both systems",
-        "chosen: the standard one, since the paper's were lost",
+        "chosen: the standard one; those of paper D are missing from the text at hand",
         choices=tuple(FIVE_BY_FIVE),
     )
     yaw_rate_error_factor: float = parameter(

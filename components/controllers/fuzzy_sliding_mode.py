@@ -19,7 +19,7 @@ LABELS = "SS S M B BB"
 
 TABLE = """
     SS  SS  S   S   M
-    S   S   M   M   M
+    SS  S   M   M   M
     S   M   M   B   B
     S   M   B   B   BB
     M   M   B   BB  BB

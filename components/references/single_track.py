@@ -12,7 +12,7 @@ Rates of the limited references, as needed by sliding mode: `control_laws.refere
 
 The model interpolates steer angle and speed linearly between their last and new values. Below `low_speed`,
 where its time constants vanish, it runs at that speed and the yaw rate is reduced in proportion to the true
-speed; for a car at rest or rolling backwards it is zero.
+speed; for a car at rest or rolling backwards it is zero. `speed` says which speed that is.
 
 Source: paper B, equations (16)-(18); paper D, equation (3).
 """
@@ -62,6 +62,13 @@ class SingleTrackParameters:
         "paper B, equation (18): 0.02 s2/m times g",
         minimum=0.0,
     )
+    speed: str = parameter(
+        "actual",
+        None,
+        "Speed of model and limits: the car's actual one, or the initial one as that which is desired",
+        "chosen: paper B's equations have V_x, its text and figure 2 the desired V_xd",
+        choices=("actual", "initial"),
+    )
     rate_time_constant: float = like(RateParameters, "rate_time_constant")
     low_speed: float = parameter(
         2.0, "m/s", "Smallest speed of the model", "chosen: walking pace", minimum=0.1
@@ -82,6 +89,7 @@ class SingleTrack(Reference):
         self.car = SingleTrackCar.of(self.p, self.p.yaw_inertia)
 
     def begin(self, u: list[float]) -> tuple[float, float]:
+        self.initial = u[1]
         self.feed = self._feed(u)
         self.model = self._steady(*self.feed)  # a dynamic model starts in its steady state
         return self._limit(u)
@@ -104,10 +112,14 @@ class SingleTrack(Reference):
             self.model = beta, r
         return self._limit(u)
 
+    def _speed(self, u: list[float]) -> float:
+        """Return the speed [m/s] that the reference goes by."""
+        return self.initial if self.p.speed == "initial" else u[1]
+
     def _feed(self, u: list[float]) -> tuple[float, float]:
         """Return the steer angle [rad] and speed [m/s] of the model."""
         p = self.p
-        delta, v = u[0], max(u[1], p.low_speed)
+        delta, v = u[0], max(self._speed(u), p.low_speed)
         if p.limit_steer_angle:  # to that of a steady turn at the friction limit
             gain, _ = self.car.gains(v)
             delta = clamp(delta, p.friction_share * max(u[2], 0.0) * G / max(v * gain, 1e-9))
@@ -122,7 +134,7 @@ class SingleTrack(Reference):
         """Return (r_ref [rad/s], beta_ref [rad]) for the model's state; equations (17), (18)."""
         p = self.p
         beta, r = self.model
-        v = max(u[1], 0.0)
+        v = max(self._speed(u), 0.0)
         mu = max(u[2], 0.0)
         if v < p.low_speed:
             r *= v / p.low_speed

@@ -4,6 +4,9 @@ The law is described in `control_laws.slip_control`. It needs the tyre's F_x(kap
 load and friction, which it evaluates with the functions of the tyre components. Its tyre parameters must be
 those of the tyre, as with a vehicle file in a scenario.
 
+`slip_share_*` tells whether a wheel keeps to (33) at this instant: its slip over the share of the optimum
+that it may have there, whatever is asked for.
+
 Source: paper B, equations (31)-(38).
 """
 
@@ -13,7 +16,8 @@ from typing import Any
 from ..control_laws.slip_control import SlipControlParameters, wheel_torque
 from ..fmi.component import Component
 from ..fmi.variables import output, parameter
-from ..tyre_models.tyre import Tyre
+from ..tyre_models.slip_curve import slip_for_force
+from ..tyre_models.tyre import Curve, Tyre
 from ..tyres.dugoff import Dugoff
 from ..tyres.linear import LinearTyre
 from ..tyres.magic_formula import MagicFormula
@@ -28,6 +32,17 @@ TYRES: dict[str, type[Tyre]] = {
     "linear": LinearTyre,
 }
 """Tyre models available to the slip control."""
+
+
+ANY_FORCE = 1e6
+"""More than any tyre gives [N], so that what is asked for is the limit of the slip."""
+
+
+def slip_share(kappa: float, curve: Curve, share: float) -> float:
+    """Return |kappa| over the slip limit of equation (33), `share` of the optimum on its side."""
+    force, first = curve
+    most = ANY_FORCE if kappa > 0.0 else -ANY_FORCE
+    return abs(kappa / slip_for_force(most, force, first=first, cap=1.0, share=share))
 
 
 OF_TYRES: Any = tuple(tyre.CurveParameters for tyre in TYRES.values())
@@ -67,6 +82,12 @@ class Slip(Component):
             unit="1",
             text="Slip that gives the requested force, within the limits",
         ),
+        output(
+            "slip_share_*",
+            *("slip_ratio_*", "slip_angle_*", "vertical_load_*", "friction_*"),
+            unit="1",
+            text="Slip over the share of the optimum that it may have, equation (33): above 1 it is beyond",
+        ),
     )
     sampled = True
 
@@ -91,14 +112,15 @@ class Slip(Component):
         self.sample_time = h
 
     def output(self, t: float, u: list[float]) -> list[float]:
-        curve = TYRES[self.p.tyre].curve
-        torques, targets = [], []
+        curve_of = TYRES[self.p.tyre].curve
+        torques, targets, shares = [], [], []
         by_wheel = zip(*self.by_signal(u), self.accelerations, self.axles, strict=True)
         for request, kappa, alpha, f_z, w, v, mu, dv, axle in by_wheel:
+            curve = curve_of(alpha, f_z, mu, axle)
             torque, target = wheel_torque(
                 request,
                 kappa,
-                curve(alpha, f_z, mu, axle),
+                curve,
                 w=w,
                 v=v,
                 dv=dv,
@@ -107,4 +129,5 @@ class Slip(Component):
             )
             torques.append(torque)
             targets.append(target)
-        return torques + targets
+            shares.append(slip_share(kappa, curve, self.p.optimum_share))
+        return torques + targets + shares

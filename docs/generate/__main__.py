@@ -15,6 +15,7 @@ from . import (
     blind_tables,
     commands,
     evidence,
+    fuzzy_sets,
     library,
     matrix_tables,
     metrics,
@@ -42,6 +43,7 @@ PAGES: dict[str, Callable[[], str]] = {
     "trust.md": evidence.page,
     "reference/vehicles.md": vehicles.page,
     **rooms.pages(),
+    "theory/paper_c_sets.svg": fuzzy_sets.figure,
 }
 """Path in the docs -> what returns its text."""
 PUBLISHED = (blind_tables, matrix_tables, monitor_tables, threat_tables)

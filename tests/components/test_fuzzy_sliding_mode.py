@@ -13,7 +13,7 @@ from .stand import Stand
 
 TABLE = [
     ["SS", "SS", "S", "S", "M"],
-    ["S", "S", "M", "M", "M"],
+    ["SS", "S", "M", "M", "M"],
     ["S", "M", "M", "B", "B"],
     ["S", "M", "B", "B", "BB"],
     ["M", "M", "B", "BB", "BB"],

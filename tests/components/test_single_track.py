@@ -205,3 +205,14 @@ def test_an_oversteering_car_beyond_its_critical_speed_is_held_by_the_limits():
             y = stand.step(0.01, steer_angle=0.02, velocity_x=45.0, friction=0.8)
         assert y["yaw_rate_ref"] == pytest.approx(0.8 * G / 45.0, rel=1e-12)
         assert abs(y["sideslip_ref"]) == pytest.approx(atan(0.02 * 0.8 * G), rel=1e-12)
+
+
+@pytest.mark.parametrize("mode", ["steady_state", "dynamic"])
+def test_with_the_initial_speed_a_car_that_slows_down_has_the_reference_of_one_that_does_not(mode):
+    slowing, steady = Stand(SingleTrack, mode=mode, speed="initial"), Stand(SingleTrack, mode=mode)
+    for stand in (slowing, steady):
+        stand.start(velocity_x=25.0, friction=0.6)
+    for k in range(200):
+        given = {"steer_angle": 0.08 * sin(0.03 * k), "friction": 0.6}
+        found = slowing.step(0.005, velocity_x=25.0 - 0.1 * k, **given)
+        assert found == steady.step(0.005, velocity_x=25.0, **given)

@@ -266,6 +266,27 @@ def test_the_unit_gives_each_wheel_its_own_torque_and_shows_its_slip_target():
     assert torques[0] < torques[2] < 0.0 == torques[3] < torques[1]
 
 
+def test_the_share_of_the_slip_is_one_at_095_of_the_optimum_of_each_wheel_whatever_is_asked_for():
+    stand = Stand(Slip)
+    wheels = {"fl": (4000.0, 0.0, 1.0), "fr": (2000.0, 0.1, 0.3), "rl": (6000.0, -0.05, 0.6)}
+    given, limits = {}, {}
+    for wheel, (f_z, alpha, mu) in wheels.items():
+        force = tyre_curve(alpha, f_z, mu)[0]
+        grid = [k / 2000 for k in range(1, 2000)]
+        limits[wheel] = 0.95 * max(grid, key=lambda kappa, force=force: -force(-kappa))
+        given |= {f"vertical_load_{wheel}": f_z, f"slip_angle_{wheel}": alpha, f"friction_{wheel}": mu}
+        given |= {f"wheel_speed_{wheel}": 60.0, f"wheel_velocity_{wheel}": 60.0 * 0.313}
+    stand.start(**given)
+    for part in (0.5, 1.0, 1.3):
+        slips = {f"slip_ratio_{wheel}": -part * limit for wheel, limit in limits.items()}
+        for request in (0.0, -500.0):
+            asked = {f"force_request_{wheel}": request for wheel in wheels}
+            out = stand.step(0.001, **slips, **asked)
+            for wheel in wheels:
+                assert out[f"slip_share_{wheel}"] == pytest.approx(part, rel=0.01)
+    assert stand.step(0.001)["slip_share_rr"] == 0.0
+
+
 def test_the_wheels_acceleration_is_its_filtered_difference():
     stand = Stand(Slip, acceleration_filter=0.0, switching_gain=0.0, slip_gain=0.0)
     given = {"slip_ratio_fl": -0.01, "vertical_load_fl": 4000.0, "friction_fl": 1.0, "wheel_speed_fl": 60.0}

@@ -21,7 +21,6 @@ from yawbench.ranking.ranking_scores import (
     RankedState,
     RankingCell,
     apart_by_conditions,
-    deciding_digits,
     placed,
 )
 from yawbench.ranking.ranking_tables import state_words

@@ -13,6 +13,7 @@ import yaml
 import yawbench as yb
 from docs.generate import blind_tables
 from tests.commands import status_of
+from tests.refusals import sentence_has
 from yawbench.studies.load_experiment import load_experiment
 
 SWEEP = blind_tables.RUNS.parent / "blind_estimators.yaml"
@@ -35,6 +36,18 @@ def test_errors_are_factors_on_what_the_car_has():
 def test_the_table_of_the_docs_follows_from_the_published_runs():
     ((page, text),) = blind_tables.pages_with_tables().items()
     assert text == page.read_text(encoding="utf-8")
+
+
+def test_the_page_says_how_far_the_kinematic_estimator_is_off_in_the_spin():
+    with blind_tables.RUNS.open(encoding="utf-8", newline="") as lines:
+        rows = [row for row in csv.DictReader(lines) if row["error"] == blind_tables.RIGHT]
+    by_run: dict[str, list[float]] = {}
+    for row in rows:
+        by_run.setdefault(row["run"], []).append(float(row["kinematic [rad]"]))
+    mean = {run: np.degrees(np.mean(values)) for run, values in by_run.items()}
+    text = " ".join(blind_tables.PAGE.read_text(encoding="utf-8").split())
+    assert sentence_has(text, f"{max(mean.values()):.1f}°", "spin", "errs")
+    assert max(mean.values()) > 0.5 * sum(mean.values())
 
 
 def test_every_run_of_the_sweep_is_published():

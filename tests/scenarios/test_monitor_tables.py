@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import random
+import statistics
 from pathlib import Path
 
 import pytest
@@ -37,6 +38,19 @@ def test_every_run_of_the_study_is_published_with_ten_seeds(published):
     assert {outcome.number for outcome in published.values()} == {10}
 
 
+def test_the_page_names_every_fault_that_no_run_finds_before_anything_else(published):
+    page = monitor_tables.PAGE.read_text(encoding="utf-8")
+    first = next(line for line in page.splitlines() if line.startswith("|"))
+    assert first.startswith("| fault | in no run, monitor_redundancy")
+    blind = page.partition("<!-- end of blind -->")[0]
+    (row,) = (line for line in blind.splitlines() if line.startswith("| gyro: bias"))
+    cells = [cell.strip() for cell in row.strip("|").split("|")]
+    sizes = [("0.5", "gyro_bias_0_5"), ("1", "gyro_bias_1"), ("2", "gyro_bias_2"), ("3", "gyro_bias_3")]
+    for cell, key in ((cells[1], "with"), (cells[3], "parity")):
+        never = [size for size, name in sizes if not published[f"{key}/B/{name}"].delays]
+        assert cell.split(", ") == never
+
+
 @pytest.mark.parametrize("fault", ["gyro_bias_2", "gyro_bias_3", "gyro_drift_1", "a_y_bias_1"])
 def test_parity_locates_small_faults_that_redundancy_never_finds(fault, published):
     signal = {name: signal for _, name, signal in monitor_tables.rows_of_faults()}[fault]
@@ -58,6 +72,63 @@ def test_a_healthy_monitor_gives_no_alarm(published):
         most = f"at most {100 * share_bounds(0, number).high:.0f} %"
         assert sentence_has(page, number, "healthy")
         assert most in page
+
+
+def test_the_sentences_on_faults_have_the_numbers_of_the_runs(published):
+    def middle(name: str) -> float:
+        return statistics.median(published[name].sideslip)
+
+    def spins(name: str) -> int:
+        return sum(angle > monitor_tables.SPIN for angle in published[name].sideslip)
+
+    page = " ".join(monitor_tables.SIDESLIP_PAGE.read_text(encoding="utf-8").split())
+    before, after = middle("without/B/none"), middle("with/B/none")
+    of_c = middle("with/C/none") - middle("without/C/none")
+    assert sentence_has(
+        page,
+        f"{after - before:.2f} degrees",
+        f"{100 * (after / before - 1):.0f} %",
+        f"{after:.2f}",
+        f"{before:.2f}",
+        f"{of_c:.2f}",
+        "`monitor_parity`",
+        "adds",
+    )
+    for paper in "BC":
+        assert published[f"parity/{paper}/none"].sideslip == published[f"without/{paper}/none"].sideslip
+    noisy = "B/gyro_noise_3"
+    assert middle(f"parity/{noisy}") == middle(f"without/{noisy}")
+    assert sentence_has(
+        page,
+        f"{middle(f'without/{noisy}'):.1f} degrees",
+        f"{middle(f'with/{noisy}'):.0f}",
+        "`monitor_parity`",
+        "slides",
+    )
+    zero, off = "B/gyro_zero", middle(monitor_tables.OFF["B"])
+    assert sentence_has(
+        page,
+        f"{middle(f'without/{zero}'):.0f} degrees",
+        f"{middle(f'with/{zero}'):.0f}",
+        f"{middle(f'parity/{zero}'):.0f} degrees",
+        f"{off:.0f}",
+        "spins",
+        "monitor",
+    )
+    late = [
+        delay
+        for key in monitor_tables.MONITORS
+        for name in ("gyro_gain_0_7", "gyro_drift_3", "hand_wheel")
+        for delay in published[f"{key}/C/{name}"].delays
+    ]
+    assert len(late) == 60
+    assert sentence_has(page, f"{min(late):.1f}", f"{max(late):.1f} s")
+    small = "C/gyro_bias_3"
+    counts = {key: len(published[f"{key}/{small}"].delays) for key in monitor_tables.MONITORS}
+    assert counts == {"with": 6, "parity": 10}
+    assert {spins(f"{key}/{small}") for key in ("without", *counts)} == {8}
+    assert sentence_has(page, "six runs", "`monitor_parity`", "spins", "eight of ten")
+    assert sentence_has(monitor_tables.PAGE.read_text(encoding="utf-8"), f"{after - before:.2f}°", "adds")
 
 
 def test_a_run_that_spins_is_counted_and_the_others_keep_their_angle():

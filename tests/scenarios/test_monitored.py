@@ -9,10 +9,13 @@ import pytest
 
 import yawbench as yb
 from tests.checkout import ROOT
+from tests.refusals import sentence_has
 from tests.verdicts import table_in
 
 NEVER = {"monitor.fade_time": 1e9}
 """Lets the monitor watch alone."""
+SWITCHED_OFF = {"monitor.uses_steer_angle": True}
+"""Lets it fade the yaw moment for a faulty hand wheel, too."""
 FAULTS = {
     "gyro frozen": ("sensor.yaw_rate", "freeze", 1.0, None),
     "gyro frozen from 1.5 s on": ("sensor.yaw_rate", "freeze", 1.5, None),
@@ -85,6 +88,17 @@ def test_the_table_says_what_a_fault_does_with_the_monitor_and_without(name, tab
     assert table[name] == [
         f"{after:.2g} s" if after > 0.005 else "at once", angle(watched.peak), angle(blind.peak)
     ]  # fmt: skip
+
+
+def test_the_sentences_below_the_table_follow_from_it(page, table):
+    text = " ".join(page.split())
+    _, watched, blind = table["gyro 10 °/s too high"]
+    assert sentence_has(text, watched, blind, "constant", "offset")
+    kept, given_up = (
+        table["hand wheel frozen (the law is kept)"][1],
+        driven(*FAULTS["hand wheel frozen (the law is kept)"], settings=SWITCHED_OFF),
+    )
+    assert sentence_has(text, kept, f"{given_up.peak:.0f}", "better", "table")
 
 
 @pytest.mark.sampled(2)

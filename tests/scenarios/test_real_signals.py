@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import yawbench as yb
+from tests.refusals import sentence_has
+from tests.verdicts import table_in
 from yawbench.cli import main
 from yawbench.studies.load_experiment import load_experiment
 
@@ -88,6 +91,9 @@ def test_the_documentation_has_what_the_studies_measure(name, rows, page, tmp_pa
     assert {check["verdict"] for check in study["checks"]} <= {"holds"}
     written = (ROOT / "docs" / f"{page}.md").read_text("utf-8")
     assert [row for row in rows(study) if row not in written] == []
+    if name == "latency":
+        wanted = yb.open(tmp_path / "15mps/0ms/conventional")["ideal.sideslip_ref"]
+        assert sentence_has(written, f"{np.degrees(np.abs(wanted).max()):.2f}°", "peak")
 
 
 @pytest.mark.parametrize(("name", "noisy"), [("degradation", 6 * 4), ("faults", 177)])
@@ -106,6 +112,80 @@ def page() -> str:
     return (ROOT / "docs" / "estimators.md").read_text("utf-8")
 
 
+def test_the_page_says_what_the_low_pass_of_the_hand_wheel_is_worth(page):
+    """The run of the closed-loop study with friction known."""
+    known = {"sensor.latency": 0, "inputs.reference.friction": 0.5}
+    scenario = yb.load("real_signals/single_sine").set(known)
+    with_it, without = (
+        100 * run.metric("relative_rms_error(yaw_rate, ideal.yaw_rate_ref)", window=(0.5, 3.5))
+        for run in (scenario.run(), scenario.set({"estimator.inertial_bandwidth": 0}).run())
+    )
+    assert sentence_has(" ".join(page.split()), f"{without:.2f} %", f"{with_it:.2f} %")
+
+
+def test_the_sentences_on_latency_follow_from_the_table_below_them(page):
+    section = page.partition("## Paper A and latency")[2].partition("## ")[0]
+    text = " ".join(section.split())
+    table = {
+        tuple(name.split(", ")): [float(cell.removesuffix(" %")) for cell in cells]
+        for name, *cells in table_in(section)
+        if name
+    }
+    fast = [row for (speed, law), row in table.items() if speed != "15 m/s" and law != "network that learns"]
+    slow = [x for (speed, _), row in table.items() if speed == "15 m/s" for x in row]
+    learning = [table[speed, "network that learns"] for speed in ("25 m/s", "40 m/s")]
+    conventional = table["15 m/s", "conventional fuzzy"][0]
+    (begin, end), (more, most) = zip(*((row[0], row[-1]) for row in learning), strict=True)
+    assert sentence_has(
+        text, f"{4 * len(table)} runs", f"{min(min(row) for row in table.values())} %", "best"
+    )
+    without, late = (sorted(row[column] for row in fast) for column in (0, -1))
+    assert sentence_has(
+        text,
+        f"{without[0]:.0f}",
+        f"{without[-1]:.0f} %",
+        f"{late[0] + 0.01:.0f}",
+        f"{late[-1]:.0f} %",
+        f"{begin:.0f}",
+        f"{end:.0f} %",
+        f"{more:.0f}",
+        f"{most:.0f} %",
+        "20",
+        "grows",
+    )
+    assert sentence_has(text, f"{conventional} %", "conventional", "fuzzy")
+    assert sentence_has(text, f"{sorted(slow)[1]:.0f} %", "error")
+
+
+def test_the_sentence_on_bounds_has_how_far_they_lie_above_what_is_measured(page):
+    rows = [row for row in table_in(page.partition("## Controllers with estimates")[2]) if row[-1] == "met"]
+    above = []
+    for says, measured, _ in rows:
+        bound = float(
+            re.findall(r"([\d.]+)(?: %| deg| degrees)", says.rpartition(" at most ")[2] or says)[-1]
+        )
+        worst = float(re.findall(r"[\d.]+", measured)[-1])
+        above.append(100 * (bound / worst - 1))
+    assert sentence_has(" ".join(page.split()), f"{min(above):.0f}", f"{max(above):.0f} %", "worst", "result")
+
+
+def test_the_figures_of_the_measured_car_are_those_of_its_page(page):
+    cars = (ROOT / "docs" / "measured_cars.md").read_text("utf-8").partition("**Estimators**")[2]
+    rows = {name: cells for name, *cells in table_in(cars)}
+    (observer, second), (kinematic, _), (zero, _) = (
+        next(cells for name, cells in rows.items() if word in name)
+        for word in ("`estimator_observer`", "`estimator_kinematic`", "constant zero")
+    )
+    rms, _, interval = observer.partition(" ")
+    text = " ".join(page.split())
+    assert sentence_has(text, rms, interval[1:-1], "observer", "errs")
+    assert sentence_has(text, second, "worst", "second")
+    assert sentence_has(text, zero, "constant", "zero")
+    assert sentence_has(text, kinematic, "kinematic", "estimator")
+    share = 1 - float(rms.removesuffix("°")) / float(zero.removesuffix("°"))
+    assert share == pytest.approx(1 / 3, abs=0.05)  # "removes about a third"
+
+
 @pytest.mark.exhaustive
 def test_the_page_on_real_signals_has_no_row_that_the_study_does_not_measure(tmp_path):
     with pytest.raises(SystemExit) as exit_:
@@ -117,3 +197,23 @@ def test_the_page_on_real_signals_has_no_row_that_the_study_does_not_measure(tmp
     lines = (ROOT / "docs" / "real_signals.md").read_text("utf-8").splitlines()
     numbers = [line for line in lines if line.startswith(begin) and line.count(" | ") > 1]
     assert [line for line in numbers if line not in measured] == []
+    text, runs = " ".join(" ".join(lines).split()), study["runs"]
+
+    def rises(law: str) -> str:
+        late, exact = (
+            100 * runs[f"A/{law}/{step}"]["metrics"]["error"]["value"] for step in ("late", "exact")
+        )
+        return f"from {exact:.1f} to {late:.{0 if late > 100 else 1}f} %"
+
+    assert sentence_has(text, rises("learning"), "largest", "error")
+    assert sentence_has(text, rises("frozen"), "frozen", "weights")
+    assert sentence_has(text, rises("conventional"), "conventional", "fuzzy")
+    share = {
+        name: (100 * number["value"], 100 * (number.get("half") or 0.0))
+        for name, number in study["derived"].items()
+    }
+    for name in ("kept/A/learning/sideslip", "kept/C/friction", "kept/B/friction", "kept/D/friction"):
+        value, half = share[name]
+        assert f"{value:.1f} ± {half:.1f} %" in text, name
+    (before, _), (after, _) = share["kept/C/friction"], share["kept/C/biases"]
+    assert sentence_has(text, f"{before - after:.0f} percentage points", "Biases", "cost")

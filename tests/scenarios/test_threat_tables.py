@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 import random
 from dataclasses import replace
 from pathlib import Path
@@ -13,9 +14,17 @@ import pytest
 from docs.generate import threat_tables
 from tests.commands import status_of
 from tests.refusals import sentence_has
+from yawbench.ranking import threats_page
 from yawbench.ranking.ranking import angle_experiment, angles_of
-from yawbench.ranking.threat_runs import ThreatResult, published_result, survivals
-from yawbench.ranking.threats import load_threats
+from yawbench.ranking.threat_runs import Survived, ThreatResult, published_result, survivals
+from yawbench.ranking.threat_scores import (
+    compared_gains,
+    compared_setting,
+    moves_between,
+    scored,
+    scores_without,
+)
+from yawbench.ranking.threats import REFERENCE, SearchPlace, load_threats
 from yawbench.studies.executor import Executor, runner_of
 
 FILE, LANE_CHANGE = threat_tables.FILE, "lane_change"

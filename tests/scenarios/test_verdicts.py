@@ -13,8 +13,10 @@ from tests.refusals import sentence_has
 from tests.studies import judge_all
 from tests.verdicts import FILE, KINDS, page, recorded, rows_of, studies, summary, table_in
 from yawbench.orchestrator.results.folder_names import default_folder
+from yawbench.studies.claim_schema import MetricReference
 from yawbench.studies.journal import FILE as JOURNAL
 from yawbench.studies.load_experiment import load_experiment
+from yawbench.studies.result_tables import FAILS, HOLDS
 
 FILES = (
     "fnn_sideslip/study", "fuzzy_sliding_mode/study", "fuzzy_sliding_mode/distribution", "fuzzy_pid/study",
@@ -59,7 +61,7 @@ def test_the_page_on_papers_tells_of_verdicts_what_the_page_does():
         [paper.removeprefix("Paper "), *row]
         for paper, rows in found.items()
         for row in rows
-        if row.verdict in KINDS[:2]
+        if row.verdict in (HOLDS, FAILS["claims"])
     ]
     assert told[2 + len(found) :] == decided
     counts = [sum(int(row[k]) for row in summary(found)) for k in range(2, 2 + len(KINDS))]
@@ -79,3 +81,17 @@ def test_the_page_on_papers_tells_how_far_the_best_of_26_carries():
     told = " ".join(section.partition("\n## ")[0].split())
     assert sentence_has(told, best.margin, "best")
     assert sentence_has(told, best.verdict, best.region, best.flip)
+
+
+LESS, MORE = 0.99, 1.01
+"""Factors on another run's number: a difference of less than 1 % counts as none (docs/regions.md)."""
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_where_a_claim_compares_runs_less_than_one_per_cent_counts_as_none(name):
+    for claim in load_experiment(ROOT / "scenarios" / f"{name}.yaml").spec.claims:
+        for condition in claim.holds_if:
+            if isinstance(condition.bound, MetricReference):
+                factor = condition.bound.times
+                small = factor > LESS if condition.relation in ("below", "at_most") else factor < MORE
+                assert not small, (claim.says, str(condition))

@@ -6,11 +6,10 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING
 
-from yawbench.figures.display import digits_of, shown
-from yawbench.figures.style import QUIET, frame, literal, new_figure
 import numpy as np
 
-from yawbench.figures.style import QUIET, digits_of, frame, literal, new_figure, shown
+from yawbench.figures.display import digits_of, shown
+from yawbench.figures.style import QUIET, frame, literal, new_figure
 from yawbench.foundation.errors import ResultsError
 from yawbench.foundation.messages import counted, in_text, listed
 from yawbench.metrics.expressions import MetricValue
