@@ -28,7 +28,7 @@ from yawbench.metrics.expressions import (
 from yawbench.metrics.measures import catalogue as measures
 from yawbench.metrics.measures import si_of, symbol
 from yawbench.orchestrator.plan import Plan
-from yawbench.orchestrator.recordings.motion import LEAST_SPEED
+from yawbench.vocabulary.motion import LEAST_SPEED
 from yawbench.orchestrator.results.reader import FoundRun, Results, load_results
 from yawbench.orchestrator.scenario import loader
 from yawbench.orchestrator.scenario.overrides import changed, with_changes
