@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from yawbench.commands.new import kinds, schema_text
+from yawbench.commands.schema import kinds, schema_text
 
 from . import (
     blind_tables,

@@ -91,7 +91,7 @@ def test_a_failed_run_ends_with_1_and_an_interrupted_one_with_130(folder, fmus, 
     fmu = build_component(tmp_path / "controller_law.py", tmp_path)
     assert status_of("run", "half.yaml", "--fmus", fmus, "--swap", f"controller={fmu}") == 1
     assert "a run" in statuses()[1]
-    monkeypatch.setattr("yawbench.commands.build.list", _interrupted)
+    monkeypatch.setattr("yawbench.commands.list.list", _interrupted)
     assert status_of("list") == 130
     assert set(statuses()) == {0, 1, 2, 130, 143}
 

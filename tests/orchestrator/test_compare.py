@@ -12,7 +12,7 @@ import pytest
 
 from tests.changed import changed
 from tests.refusals import each_mentions, refused
-from yawbench.commands.results import distinct
+from yawbench.commands.recorded_runs import distinct
 from yawbench.figures.plots import LabelledRun
 from yawbench.figures.style import save
 from yawbench.foundation.errors import Diagnostic, ScenarioError

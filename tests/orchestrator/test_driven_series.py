@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from tests.commands import status_of
-from yawbench.commands.standard_tests import DRIVE, EvaluatedRuns
+from yawbench.commands.evaluate import DRIVE, EvaluatedRuns
 from yawbench.orchestrator.results.reader import load_results
 from yawbench.proving_ground.sine_with_dwell import amplitudes, judge_series
 from yawbench.proving_ground.standard_tests import TESTS

@@ -153,7 +153,8 @@ def test_a_standard_test_with_its_series_is_a_module_and_an_entry(steered, monke
     )
     monkeypatch.setitem(TESTS, "wiggle", entry)
     monkeypatch.setitem(DRIVEN, "wiggle-1", entry)
-    monkeypatch.delitem(sys.modules, "yawbench.commands.standard_tests", raising=False)
+    for command in ("drive", "evaluate"):
+        monkeypatch.delitem(sys.modules, f"yawbench.commands.{command}", raising=False)
     assert status_of("drive", "wiggle-1", "--scenario", "steered.yaml", "--out", "out") == 0
     found = json.loads(Path("out/evaluation.json").read_text())
     assert found["series"] == {"runs": 2}

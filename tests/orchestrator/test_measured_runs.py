@@ -12,7 +12,7 @@ import yawbench as yb
 from tests.commands import status_of
 from tests.pages.made_up import unpacked
 from tests.refusals import each_mentions
-from yawbench.commands.results import read_runs
+from yawbench.commands.recorded_runs import read_runs
 from yawbench.figures.display import LabelledRun
 from yawbench.figures.plots import draw
 from yawbench.figures.style import MEASURED_LINE

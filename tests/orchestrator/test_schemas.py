@@ -16,7 +16,8 @@ import jsonschema
 import pytest
 
 from yawbench.cli import main
-from yawbench.commands.new import begin, kinds, model_of, schema_of, schema_text
+from yawbench.commands.new import begin
+from yawbench.commands.schema import kinds, model_of, schema_of, schema_text
 from yawbench.measured_cars import fit
 from yawbench.orchestrator.recordings import measurement
 from yawbench.orchestrator.scenario import yaml_lines

@@ -5,29 +5,30 @@
 Not here: commands of wings, which stand with their wing.
 """
 
-_MODULES = {
-    "new": "new",
-    "build": "build",
-    "check": "check",
-    "run": "run",
-    "compare": "run",
-    "plot": "results",
-    "animate": "results",
-    "converge": "run",
-    "study": "experiments",
-    "report": "experiments",
-    "sweep": "experiments",
-    "evaluate": "standard_tests",
-    "drive": "standard_tests",
-    "tune": "experiments",
-    "list": "build",
-    "diff": "run",
-    "salvage": "results",
-    "tyre": "vehicle",
-    "vehicle": "vehicle",
-    "cache": "build",
-    "schema": "new",
-}
-"""Command -> its module; the function has the same name."""
+_COMMANDS = (
+    "new",
+    "build",
+    "check",
+    "run",
+    "compare",
+    "plot",
+    "animate",
+    "converge",
+    "study",
+    "report",
+    "sweep",
+    "evaluate",
+    "drive",
+    "tune",
+    "list",
+    "diff",
+    "salvage",
+    "tyre",
+    "vehicle",
+    "cache",
+    "schema",
+)
+"""The commands in the order of the help; each is a function of that name, in a module of that name."""
+_ELSEWHERE = {"study": "experiments", "report": "experiments", "sweep": "experiments"}
 
-PLUGINS = {"command": {name: f"yawbench.commands.{module}:{name}" for name, module in _MODULES.items()}}
+PLUGINS = {"command": {name: f"yawbench.commands.{_ELSEWHERE.get(name, name)}:{name}" for name in _COMMANDS}}

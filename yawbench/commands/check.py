@@ -310,7 +310,6 @@ def _grouped(pairs: Iterable[tuple[K, V]]) -> dict[K, list[V]]:
 
 
 def _order_rows(plan: Plan, direct: Iterable[Wire]) -> Iterable[Sequence[str]]:
-
     before = _grouped((w.target, w) for w in direct if not _is_backward(w, plan))
     for instance in plan.instances:
         if wires := before.get(instance.name):
@@ -319,7 +318,6 @@ def _order_rows(plan: Plan, direct: Iterable[Wire]) -> Iterable[Sequence[str]]:
 
 
 def _backward_rows(plan: Plan, direct: Iterable[Wire]) -> Iterable[Sequence[str]]:
-
     backward = _grouped(((w.source, w.target), w) for w in direct if _is_backward(w, plan))
     for (source, target), wires in backward.items():
         yield source, target, ", ".join(fold([w.output for w in wires]))

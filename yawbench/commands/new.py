@@ -1,9 +1,8 @@
-"""`yawbench new` and `schema`: templates for files of your own, and the JSON Schemas of YAML files."""
+"""`yawbench new`: templates for files of your own."""
 
 from __future__ import annotations
 
 import importlib.util
-import json
 import keyword
 import os
 import re
@@ -16,10 +15,8 @@ from pathlib import Path, PurePosixPath
 from typing import Annotated, Any, Literal
 
 import typer
-from pydantic import BaseModel
-from pydantic.json_schema import GenerateJsonSchema
 
-from yawbench.foundation import plugins
+from yawbench.commands.schema import schema_text
 from yawbench.foundation.errors import ScenarioError
 from yawbench.foundation.messages import listed
 
@@ -306,65 +303,3 @@ def _program(name: str) -> str:
     if not ours.exists() or (path is not None and os.path.samefile(path, ours)):
         return name
     return str(_shown(ours))
-
-
-KIND_OF_FILE = "kind of file"
-"""Kind of plug-ins: models that read YAML files."""
-ALSO = {"study": "experiment", "sweep": "experiment", "tuning": "experiment"}
-"""Names of commands and documents -> kind."""
-DIALECT = "http://json-schema.org/draft-07/schema#"
-"""Chosen: the latest draft that editors implement in full."""
-
-
-class _Generator(GenerateJsonSchema):
-    """Writes patterns of keys so that other keys are refused, and no titles of fields."""
-
-    def dict_schema(self, schema: Any) -> dict[str, Any]:
-        made = super().dict_schema(schema)
-        for pattern, values in made.pop("patternProperties", {}).items():
-            made |= {"propertyNames": {"pattern": pattern}, "additionalProperties": values}
-        return made
-
-    def field_title_should_be_set(self, schema: Any) -> bool:
-        return False
-
-
-def model_of(kind: str) -> type[BaseModel]:
-    """Return the model that reads files of a kind."""
-    model: type[BaseModel] = plugins.find(KIND_OF_FILE, kind)
-    return model
-
-
-def kinds() -> list[str]:
-    """Return the kinds of files that have a schema."""
-    return plugins.names(KIND_OF_FILE)
-
-
-def schema_of(kind: str) -> dict[str, Any]:
-    """Return the JSON Schema of files of a kind."""
-    made = model_of(kind).model_json_schema(schema_generator=_Generator)
-    return {"$schema": DIALECT, **made, "title": f"yawbench {kind} file"}
-
-
-def schema_text(kind: str) -> str:
-    """Return the JSON Schema of files of a kind as text."""
-    return json.dumps(schema_of(kind), indent=1, ensure_ascii=False) + "\n"
-
-
-KindName = Literal[tuple([*kinds(), *ALSO])]  # type: ignore[valid-type]
-Kind = Annotated[
-    KindName | None,  # type: ignore[valid-type]
-    typer.Argument(help="Kind of file; without it, all kinds are listed.", metavar="KIND"),
-]
-
-
-def schema(kind: Kind = None) -> None:
-    """Print the JSON Schema of a kind of YAML file.
-
-    An editor with a YAML language server checks and completes files whose first line is
-    `# yaml-language-server: $schema=PATH`; `yawbench new` writes it. Studies, sweeps and tunings are
-    experiments.
-    """
-    print(
-        "\n".join(kinds()) if kind is None else schema_text(ALSO.get(kind, kind)), end="\n" * (kind is None)
-    )

@@ -174,7 +174,6 @@ class RunOptions:
     ] = False
 
     def __post_init__(self) -> None:
-
         if self.fresh and self.no_run:
             raise ScenarioError("--fresh and --no-run are mutually exclusive", code="option-invalid")
         if self.dry_run and self.no_run:

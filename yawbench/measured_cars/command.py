@@ -261,7 +261,7 @@ def validate(
     """
     import json
 
-    from yawbench.commands.results import recorded
+    from yawbench.commands.recorded_runs import recorded
     from yawbench.figures.style import save
     from yawbench.foundation.safe_files import write_whole
     from yawbench.orchestrator.recordings.measurement import load_measurement

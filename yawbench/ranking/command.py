@@ -109,7 +109,6 @@ def rank(
 
 
 def _check(option: str, what: str, names: Sequence[str], known: Mapping[str, Any]) -> None:
-
     for name in names:
         if name not in known:
             raise ScenarioError(

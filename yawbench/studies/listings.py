@@ -28,10 +28,10 @@ from yawbench.metrics.expressions import (
 from yawbench.metrics.measures import catalogue as measures
 from yawbench.metrics.measures import si_of, symbol
 from yawbench.orchestrator.plan import Plan
-from yawbench.vocabulary.motion import LEAST_SPEED
 from yawbench.orchestrator.results.reader import FoundRun, Results, load_results
 from yawbench.orchestrator.scenario import loader
 from yawbench.orchestrator.scenario.overrides import changed, with_changes
+from yawbench.vocabulary.motion import LEAST_SPEED
 from yawbench.vocabulary.wheels import WHEELS
 
 if TYPE_CHECKING:

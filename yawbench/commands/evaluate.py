@@ -1,10 +1,10 @@
-"""`yawbench drive` and `yawbench evaluate`: make and evaluate the runs of standard tests."""
+"""`yawbench evaluate`: evaluate recorded or measured runs of a standard test."""
 
 from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -12,149 +12,23 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from yawbench.commands import output
+from yawbench.commands.output import print_tables, say, tabular
 from yawbench.foundation.errors import ResultsError, ScenarioError
 from yawbench.foundation.messages import counted, listed
 from yawbench.metrics.verdict import NotJudged
 from yawbench.orchestrator.results.run_record import RUN_FILE
-from yawbench.proving_ground.standard_tests import DRIVEN, TESTS, Evaluation, StandardTest, TestSeries
-
-from .options import CHANGES, MAKING, RunOptions, executor_of, takes
-from .output import hold, print_tables, say, stoppable, tabular
+from yawbench.proving_ground.standard_tests import TESTS, Evaluation, StandardTest, TestSeries
 
 if TYPE_CHECKING:
-    from yawbench.orchestrator.plan import Override
     from yawbench.proving_ground.trace import Trace
-    from yawbench.studies.executor import Executor
-
-
-GROUND = "proving_ground"
-"""Folder of the standard tests' scenarios."""
-
-DrivenName = Literal[tuple(DRIVEN)]  # type: ignore[valid-type]
-TestToDrive = Annotated[DrivenName, typer.Argument(help="The test.", metavar="TEST")]  # type: ignore[valid-type]
-ScenarioOption = Annotated[
-    str | None,
-    typer.Option(
-        "--scenario",
-        metavar="SCENARIO",
-        help="Scenario of a single run. Default: that of the test in proving_ground.",
-    ),
-]
-Slow = Annotated[
-    str | None,
-    typer.Option(
-        "--slow-steer",
-        metavar="SCENARIO",
-        help="Scenario of slowly increasing steer, for A; default: proving_ground/slowly_increasing_steer.",
-    ),
-]
-VehicleOption = Annotated[
-    str | None,
-    typer.Option(
-        "--vehicle", metavar="FILE", help="Vehicle file, or a name that `yawbench list vehicles` gives."
-    ),
-]
-StartAngle = Annotated[
-    str | None,
-    typer.Option(
-        "--angle",
-        metavar="ANGLE",
-        help="A (hand-wheel angle at 0.3 g), such as '35.8 deg'; default: measured by runs.",
-    ),
-]
-DriveFigures = Annotated[bool, typer.Option("--figures", help="Also draw every run.")]
-
-
-@tabular
-@takes(*CHANGES, *MAKING, "jobs", "fresh")
-def drive(
-    context: typer.Context,
-    test: TestToDrive,
-    options: RunOptions,
-    vehicle: VehicleOption = None,
-    scenario: ScenarioOption = None,
-    slow_steer: Slow = None,
-    angle: StartAngle = None,
-    figures: DriveFigures = False,
-) -> None:
-    """Make all runs of a standard test and evaluate them.
-
-    Sine with dwell: slowly increasing steer to both sides gives the angle A, which determines the
-    amplitudes, driven left first and right first. If the car rolls over, the run is judged up to then.
-
-    Lane changes of ISO 3888: finds the highest entry speed without touching a cone, to half a kilometre
-    per hour, starting at the scenario's speed.
-
-    Without --out, results go to results/<folder of the scenario>/<its name>_series. An interrupted series
-    is resumed; finished runs are not repeated.
-    """
-    from yawbench.orchestrator.results.folder_names import default_folder
-    from yawbench.orchestrator.scenario import loader
-    from yawbench.studies.driven_tests import TestDriver
-
-    chosen = DRIVEN[test]
-    changes = (*_vehicle(vehicle), *options.changes)
-    one_run = loader.find(scenario or f"{GROUND}/{str(test).replace('-', '_')}", "a scenario")
-    folder = options.out or default_folder(one_run, changes, suffix="_series")
-    execute = context.with_resource(executor_of(folder, str(one_run), options, format="parquet"))
-    if (angle or slow_steer) and not chosen.needs_angle:
-        raise ScenarioError(f"{test} takes no A: omit --angle and --slow-steer", code="option-invalid")
-    for change in changes:
-        if str(change.target) in chosen.varies:
-            why = "set by the series itself"
-            raise ScenarioError(f"{change.target}: {why}", code="option-invalid")
-    steer = f"{GROUND}/slowly_increasing_steer"
-    slow = loader.find(slow_steer or steer, "a scenario") if chosen.needs_angle else None
-    hold(context, folder)
-    known = None
-    if slow:
-        known = angle_of(angle) or _angle_driven(slow, changes, execute)
-        say(f"A = {math.degrees(known):.1f} degrees")
-    driver = TestDriver(chosen, one_run, changes, execute, known)
-    with stoppable(folder):
-        series = chosen.drive(driver)
-    EvaluatedRuns(DRIVE, chosen, driver.traces, driver.judged, series, known, folder).conclude(each=figures)
-    if driver.status:
-        raise typer.Exit(driver.status)
-
-
-def _angle_driven(scenario: Path, changes: Sequence[Override], execute: Executor) -> float:
-    """Return A [rad] from runs of slowly increasing steer.
-
-    Raises:
-        ResultsError: the runs do not determine it.
-        typer.Exit: a run failed.
-    """
-    from yawbench.proving_ground.steering_tests import characteristic_angle
-    from yawbench.studies.driven_tests import TestDriver, slow_steer_runs
-
-    driver = TestDriver(TESTS["slowly-increasing-steer"], scenario, changes, execute)
-    with stoppable(execute.folder):
-        judged = driver.make(slow_steer_runs(scenario, changes, execute))
-    if driver.status:
-        raise typer.Exit(driver.status)
-    try:
-        return characteristic_angle(judged)
-    except NotJudged as why:
-        raise ResultsError(str(why), code="test-not-applicable") from None
-
-
-def _vehicle(name: str | None) -> tuple[Override, ...]:
-    """Return the override of the vehicle file.
-
-    Raises:
-        ScenarioError: the file does not exist.
-    """
-    from yawbench.orchestrator.plan import Override
-    from yawbench.orchestrator.scenario import loader
-
-    if name is None:
-        return ()
-    return (Override.of("vehicle", str(loader.find(name, "a vehicle file").resolve()), "--vehicle"),)
 
 
 TestName = Literal[tuple(TESTS)]  # type: ignore[valid-type]
+
+
 TestToEvaluate = Annotated[TestName, typer.Argument(help="The test.", metavar="TEST")]  # type: ignore[valid-type]
+
+
 EvaluatedSources = Annotated[
     list[Path],
     typer.Argument(
@@ -162,17 +36,25 @@ EvaluatedSources = Annotated[
         metavar="RESULTS...",
     ),
 ]
+
+
 SlowSteer = Annotated[
     list[Path] | None,
     typer.Option(
         "--slow-steer", metavar="RESULTS", help="Runs of slowly increasing steer, for A. Repeatable."
     ),
 ]
+
+
 CharacteristicAngle = Annotated[
     str | None,
     typer.Option("--angle", metavar="ANGLE", help="A, the hand-wheel angle at 0.3 g, such as '35.8 deg'."),
 ]
+
+
 EvaluationFigures = Annotated[bool, typer.Option("--figures/--no-figures", help="Draw every run.")]
+
+
 OutFile = Annotated[
     Path | None,
     typer.Option(
@@ -182,9 +64,14 @@ OutFile = Annotated[
     ),
 ]
 
+
 FILE, PAGE = "evaluation.json", "evaluation.html"
+
+
 DRIVE, EVALUATE = "drive", "evaluate"
 """Commands that write evaluations; neither replaces those of the other."""
+
+
 BESIDE = "evaluated"
 """Folder of an evaluation below a folder that has one of another command already."""
 
@@ -209,7 +96,7 @@ def evaluate(
     from yawbench.orchestrator.results.measurement_results import load_run
     from yawbench.proving_ground.trace import trace_of
 
-    from .results import distinct, folder_of_all
+    from .recorded_runs import distinct, folder_of_all
 
     chosen = TESTS[test]
     known = _angle(angle, slow_steer, chosen)
