@@ -18,9 +18,9 @@ from time import perf_counter
 
 import pytest
 
-from tests.commands import status_of
-from tests.pages.browser import Browser, start
-from tests.pages.flaws import size_without_samples
+from tests.command_line import status_of
+from tests.reports.browser import Browser, start
+from tests.reports.flaws import size_without_samples
 from yawbench.bench.server import ResultsServer
 from yawbench.bench.sliders import Bench
 from yawbench.reports.page_parts import PAGE

@@ -39,10 +39,10 @@ from typing import Any
 import numpy as np
 from ruamel.yaml import YAML
 
-from tests.orchestrator.test_batch_commands import SCENARIO as HALF
-from tests.orchestrator.test_batch_commands import STUDY
-from tests.orchestrator.test_fit import FIT, MEASURED
-from tests.orchestrator.test_fit import SCENARIO as OF_FIT
+from tests.commands.test_batch_commands import SCENARIO as HALF
+from tests.commands.test_batch_commands import STUDY
+from tests.measured_cars.test_fit import FIT, MEASURED
+from tests.measured_cars.test_fit import SCENARIO as OF_FIT
 from yawbench.cli import main as yawbench
 
 from .kills import SWEEP

@@ -1,6 +1,6 @@
 """Runs with an FMU that does harm: `python -m campaigns.hostile_fmus [PART OF A NAME ...]`.
 
-Every behaviour of `tests/orchestrator/hostile.c` in every call of FMI, with and without `--isolate`, in a
+Every behaviour of `tests/fmus/hostile.c` in every call of FMI, with and without `--isolate`, in a
 forked command line each. What must hold stands in `verdict`. Prints what did not, and a table.
 """
 
@@ -34,7 +34,7 @@ from yawbench.orchestrator.master import isolation  # noqa: F401
 from yawbench.orchestrator.master.simulate import simulate  # noqa: F401
 from yawbench.orchestrator.wiring.make_plan import make_plan  # noqa: F401
 
-SOURCE = Path(__file__).parents[1] / "tests" / "orchestrator" / "hostile.c"
+SOURCE = Path(__file__).parents[1] / "tests" / "fmus" / "hostile.c"
 INCLUDE = Path(__file__).parents[1] / "fmus"
 
 SET_UP = ("load", "instantiate", "setup", "enter", "leave")

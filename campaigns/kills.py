@@ -23,10 +23,10 @@ from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from pathlib import Path
 
-from tests.orchestrator.test_batch_commands import SCENARIO, STUDY, UNITS
-from tests.orchestrator.test_ranking import SMALL
-from tests.orchestrator.test_tuning import SCENARIO as WHEEL
-from tests.orchestrator.test_tuning import TUNING
+from tests.commands.test_batch_commands import SCENARIO, STUDY, UNITS
+from tests.ranking.test_ranking import SMALL
+from tests.studies.test_tuning import SCENARIO as WHEEL
+from tests.studies.test_tuning import TUNING
 from yawbench.fmus.build import build_all
 from yawbench.foundation.errors import ResultsError
 from yawbench.foundation.safe_files import LOCK_FILE, NEW

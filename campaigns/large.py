@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from tests.orchestrator.fake_fmus import Var, make_fmu, out
+from tests.fmus.fake_fmus import Var, make_fmu, out
 
 
 def write_ring(folder: Path, *, units: int, variables: int, follows: str) -> Path:

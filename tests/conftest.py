@@ -8,19 +8,27 @@ from __future__ import annotations
 
 import gc
 import os
-from collections.abc import Callable
+import shlex
+import subprocess
+from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
 
 import pytest
 
-from tests.commands import status_of
+from tests.command_line import status_of
 from tests.fmu_copies import put_fmus
+from tests.reports import browser as browsers
+from yawbench.fmus.build import build_component
+from yawbench.fmus.c import c_recipe
 from yawbench.foundation.workers import default_workers
 
 TESTS = Path(__file__).parent
+FMUS = TESTS / "fmus"
+"""Folder of FMUs and components in C that are made for tests."""
 LONGEST_FIRST = (
-    *("scenarios", "trials", "pages", "docs", "orchestrator", "yawbench", "fmus"),
+    *("scenarios", "trials", "studies", "ranking", "reports", "bench", "docs", "orchestrator", "commands"),
+    *("interop", "measured_cars", "yawbench", "fmus"),
     *("components/test_conformance.py", "components/test_car_on_tyres.py", "components/test_w"),
     "components",
 )
@@ -93,3 +101,69 @@ def yawbench(capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str
 def evenly(number: int, total: int) -> set[int]:
     """Return `number` indices, the first and the last among them, of `total`."""
     return {k * (total - 1) // max(number - 1, 1) for k in range(number)}
+
+
+@pytest.fixture
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty cache of unpacked FMUs, in place of the user's."""
+    folder = tmp_path / "cache"
+    monkeypatch.setenv("YAWBENCH_CACHE", str(folder))
+    return folder
+
+
+@pytest.fixture(scope="session")
+def unpacked(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A cache for many tests: equal FMUs are unpacked and described once."""
+    return tmp_path_factory.mktemp("unpacked")
+
+
+@pytest.fixture
+def common_cache(unpacked: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The cache for many tests, in place of the user's."""
+    monkeypatch.setenv("YAWBENCH_CACHE", str(unpacked))
+
+
+def build_here(source: Path, folder: Path) -> Path:
+    """Build a component in C without its library for Windows, which takes as long as that for Linux."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(c_recipe, "TO_WINDOWS", "no-compiler-for-windows")
+        return build_component(source, folder)
+
+
+@pytest.fixture(scope="session")
+def library(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A compiled FMU library from elsewhere: it doubles its inputs, and answers a step as it is told."""
+    return compiled(FMUS / "foreign.c", tmp_path_factory.mktemp("foreign") / "foreign.so")
+
+
+@pytest.fixture(scope="session")
+def bare_library(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The same without the functions that many FMUs leave out, those for texts among them."""
+    return compiled(FMUS / "foreign.c", tmp_path_factory.mktemp("bare") / "foreign.so", "-DBARE")
+
+
+def compiled(source: Path, target: Path, *options: str) -> Path:
+    """Return the library that is made of a file of C."""
+    compiler = shlex.split(os.environ.get("CC", "cc"))
+    include = TESTS.parent / "fmus"
+    flags = ["-shared", "-fPIC", "-w", f"-I{include}", *options]
+    subprocess.run([*compiler, *flags, source, "-o", target, "-lm"], check=True)
+    return target
+
+
+@pytest.fixture(scope="session")
+def window() -> Iterator[browsers.Browser]:
+    """A browser, one for all tests of a worker."""
+    browser = browsers.start()
+    try:
+        yield browser
+    finally:
+        browser.driver.quit()
+
+
+@pytest.fixture(scope="module")
+def chromium(window: browsers.Browser) -> Iterator[browsers.Browser]:
+    """The browser, left without a page and without messages on its console at the end of a file."""
+    yield window
+    window.driver.get("about:blank")
+    window.console()

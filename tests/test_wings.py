@@ -21,10 +21,10 @@ CORE = (
     "tests/orchestrator/test_wiring.py",
     "tests/orchestrator/test_master.py",
     "tests/orchestrator/test_results.py",
-    "tests/orchestrator/test_metrics.py",
-    "tests/orchestrator/test_study.py",
-    "tests/orchestrator/test_compare.py",
-    "tests/pages/test_compare_page.py",
+    "tests/metrics/test_metrics.py",
+    "tests/studies/test_study.py",
+    "tests/studies/test_compare.py",
+    "tests/reports/test_compare_page.py",
 )
 """Files of tests of the core; chosen: one or more of each room."""
 

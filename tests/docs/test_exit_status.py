@@ -10,9 +10,9 @@ import pytest
 
 import yawbench as yb
 from tests.checkout import ROOT
-from tests.commands import status_of
-from tests.orchestrator.test_batch_commands import SCENARIO, STUDY
-from tests.orchestrator.test_validation import line
+from tests.command_line import status_of
+from tests.commands.test_batch_commands import SCENARIO, STUDY
+from tests.measured_cars.test_validation import line
 from yawbench.fmus.build import build_component
 
 UNITS = ("driver_sine", "reference_steady_state", "controller_off", "controller_fuzzy_sideslip")

@@ -15,7 +15,7 @@ import pytest
 
 import yawbench as yb
 from tests.checkout import ROOT
-from tests.pages.made_up import unpacked
+from tests.reports.made_up import unpacked
 
 FOLDER = ROOT / "notebooks"
 NOTEBOOKS = sorted(FOLDER.glob("*.ipynb"))

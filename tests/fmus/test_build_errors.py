@@ -11,7 +11,7 @@ import sys
 import pytest
 
 from tests.fmus.bare import Fmu, Unit
-from tests.orchestrator.fake_fmus import make_fmu
+from tests.fmus.fake_fmus import make_fmu
 from tests.refusals import each_mentions, mentions, refused, texts_of
 from yawbench.fmus import check
 from yawbench.fmus.build import COMPONENTS, build_all, build_component

@@ -16,6 +16,11 @@ import pytest
 
 import yawbench as yb
 from tests.cars import load_scenario, make_plan
+from tests.commands.test_run import FAULTY, PAIR
+from tests.conftest import compiled
+from tests.fmus import models3
+from tests.fmus.models3 import make_fmu
+from tests.orchestrator.test_foreign import write_fmu
 from tests.refusals import mentions, refused
 from yawbench.cli import main
 from yawbench.fmus.build import build_component
@@ -26,12 +31,6 @@ from yawbench.orchestrator.master.simulate import simulate
 from yawbench.orchestrator.master.step_loop import RunPosition
 from yawbench.orchestrator.results.reader import load_results
 from yawbench.orchestrator.scenario.loader import names
-
-from . import models3
-from .conftest import compiled
-from .models3 import make_fmu
-from .test_foreign import write_fmu
-from .test_run import FAULTY, PAIR
 
 pytestmark = [
     pytest.mark.skipif(sys.platform != "linux", reason="compiles for Linux"),

@@ -5,13 +5,12 @@ import signal
 
 import pytest
 
+from tests.orchestrator.fakes import Behaviour, Clock, Echo, FakeSlave, Function, Mixed, Stage, make_plan
 from tests.refusals import each_mentions, mentions
 from yawbench.foundation.errors import Interrupted, SimulationError
 from yawbench.orchestrator.master.log import DISCARD, ERROR, FATAL, OK, PENDING, WARNING
 from yawbench.orchestrator.master.simulate import simulate
 from yawbench.orchestrator.results.reader import load_results
-
-from .fakes import Behaviour, Clock, Echo, FakeSlave, Function, Mixed, Stage, make_plan
 
 
 class Passing(Behaviour):

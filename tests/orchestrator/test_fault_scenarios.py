@@ -9,6 +9,8 @@ import pytest
 from matplotlib.colors import to_hex
 
 import yawbench as yb
+from tests.fmus.fake_fmus import Var, make_fmu, out
+from tests.orchestrator.recorded import car, noted
 from tests.refusals import each_mentions, mentions, texts_of
 from yawbench.cli import main
 from yawbench.figures.plots import FAULTY, LabelledRun, draw
@@ -20,9 +22,6 @@ from yawbench.orchestrator.scenario.loader import load_scenario
 from yawbench.orchestrator.scenario.overrides import read_changes
 from yawbench.orchestrator.wiring.make_plan import make_plan as plan_of_scenario
 from yawbench.studies.load_experiment import load_experiment
-
-from .fake_fmus import Var, make_fmu, out
-from .recorded import car, noted
 
 SCENARIO = """\
 title: Faulty

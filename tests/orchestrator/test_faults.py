@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.orchestrator.fakes import Clock, Function, Integrator, Stage, Witness, make_plan
 from tests.refusals import mentions
 from yawbench.foundation.interrupts import StopFlag
 from yawbench.orchestrator.fault_kinds import KINDS, CountedNoise, Fault, FaultLocation, FaultySignal
@@ -17,8 +18,6 @@ from yawbench.orchestrator.master.simulate import simulate, simulate_in_memory
 from yawbench.orchestrator.master.step_loop import Master
 from yawbench.orchestrator.results.freshness import staleness
 from yawbench.orchestrator.results.reader import load_results
-
-from .fakes import Clock, Function, Integrator, Stage, Witness, make_plan
 
 ALGORITHMS = ("jacobi", "gauss_seidel", "extrapolated")
 BEGIN, END, STEP = 1.0, 2.0, 1 / 8

@@ -11,13 +11,12 @@ import pytest
 
 from tests.cars import load_scenario, make_plan
 from tests.changed import changed
+from tests.conftest import compiled
+from tests.fmus.fake_fmus import make_fmu, model_description
 from yawbench.cli import main
 from yawbench.fmus.description import binary_of
 from yawbench.foundation.errors import Diagnostic
 from yawbench.orchestrator.results.reader import load_results
-
-from .conftest import compiled
-from .fake_fmus import make_fmu, model_description
 
 pytestmark = pytest.mark.usefixtures("common_cache")
 

@@ -9,14 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.conftest import compiled
+from tests.fmus import models3
+from tests.fmus.models3 import make_fmu
+from tests.orchestrator.test_foreign import write_fmu
 from tests.refusals import mentions
 from yawbench.cli import main
 from yawbench.orchestrator.results.reader import load_results
-
-from . import models3
-from .conftest import compiled
-from .models3 import make_fmu
-from .test_foreign import write_fmu
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="compiles for Linux")
 together_and_apart = pytest.mark.parametrize("isolate", [[], ["--isolate"]], ids=["together", "apart"])

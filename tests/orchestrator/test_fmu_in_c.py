@@ -19,7 +19,6 @@ from yawbench.orchestrator.plan import Instance, Plan, Wire
 from yawbench.orchestrator.results.reader import load_results
 from yawbench.orchestrator.signal_names import SignalName
 
-HERE = Path(__file__).parent
 TYPES = ("Real", "Integer", "Boolean", "String")
 DISCARD, ERROR, FATAL = 2, 3, 4
 AT_THE_END = 100

@@ -9,6 +9,7 @@ import sys
 
 import pytest
 
+from tests.orchestrator.fakes import Clock, Function, Stage, make_plan
 from tests.refusals import mentions, refused
 from tests.trees import snapshot
 from yawbench.foundation.errors import ResultsError, SimulationError
@@ -20,8 +21,6 @@ from yawbench.orchestrator.results.folder_lock import FolderLock, holder_of, wri
 from yawbench.orchestrator.results.reader import found_runs, load_results
 from yawbench.orchestrator.results.salvage import lost_format, salvage
 from yawbench.studies.listings import runs_table
-
-from .fakes import Clock, Function, Stage, make_plan
 
 needs_locks = pytest.mark.skipif(sys.platform == "win32", reason="folders cannot be locked")
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 import zipfile
-from pathlib import Path
 
 import fmpy
 import pytest
@@ -17,7 +16,6 @@ from yawbench.orchestrator.master import child_run
 from yawbench.orchestrator.results.freshness import staleness
 from yawbench.orchestrator.results.reader import load_results
 
-HERE = Path(__file__).parent
 INPUT, OUTPUT, ANSWER = 1000001, 4000000000, 7
 WORDS = {1: "warning", 2: "discard", 3: "error", 4: "fatal"}
 STARTS = {"Real": "0", "Integer": "0", "Boolean": "false", "String": "", "Enumeration": "1"}

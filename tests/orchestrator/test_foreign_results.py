@@ -17,6 +17,7 @@ import pytest
 from lxml import html
 
 import yawbench as yb
+from tests.orchestrator import recorded
 from tests.refusals import mentions, refused
 from tests.trees import snapshot
 from yawbench.foundation.errors import ResultsError, ScenarioError, YawbenchError
@@ -25,8 +26,6 @@ from yawbench.orchestrator.plan import Override
 from yawbench.orchestrator.results.folder_lock import FolderLock, holder_of
 from yawbench.orchestrator.results.folder_names import below_results, default_folder
 from yawbench.orchestrator.results.salvage import salvage
-
-from . import recorded
 
 UNITS = ("driver_sine", "reference_steady_state", "controller_off", "controller_fuzzy_sideslip")
 

@@ -10,6 +10,8 @@ import pyarrow.parquet as pq
 import pytest
 
 from tests.fmu_copies import put_fmus
+from tests.orchestrator.fakes import Clock, Function, Stage, make_plan
+from tests.orchestrator.recorded import car, record_text, write
 from tests.refusals import mentions, refused
 from yawbench.cli import main
 from yawbench.foundation.errors import ResultsError, ScenarioError, SimulationError, YawbenchError
@@ -19,9 +21,6 @@ from yawbench.orchestrator.results.file_formats import FILES
 from yawbench.orchestrator.results.reader import load_results
 from yawbench.orchestrator.results.recorder import BLOCK, MemoryRecorder, recorder_of
 from yawbench.orchestrator.results.run_record import RunRecord
-
-from .fakes import Clock, Function, Stage, make_plan
-from .recorded import car, record_text, write
 
 COLUMNS = ["a.n", "a.x", "a.s", "a.y", "a.b"]
 REAL = [False, True, False, True, False]

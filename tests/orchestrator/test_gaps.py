@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import yawbench as yb
-from tests.commands import status_of
+from tests.command_line import status_of
 from yawbench.figures.display import LabelledRun
 from yawbench.figures.plots import spans_of
 from yawbench.foundation.errors import ScenarioError

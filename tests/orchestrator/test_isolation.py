@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from tests.changed import changed
+from tests.conftest import build_here
 from tests.refusals import mentions
 from yawbench.cli import main
 from yawbench.commands.new import begin
@@ -20,8 +21,6 @@ from yawbench.orchestrator.master.simulate import simulate
 from yawbench.orchestrator.results.reader import load_results
 from yawbench.orchestrator.scenario.loader import load_scenario
 from yawbench.orchestrator.wiring.make_plan import make_plan
-
-from .conftest import build_here
 
 ROOT = Path(__file__).parents[2]
 CAR = ROOT / "scenarios" / "fnn_sideslip" / "25mps.yaml"

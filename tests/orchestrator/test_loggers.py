@@ -5,11 +5,21 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tests.orchestrator.measured_files import (
+    GRAVITY,
+    SIDE,
+    SPEED,
+    TIMES,
+    YAW,
+    described,
+    read,
+    refusal,
+    rows,
+    segment,
+)
 from yawbench.foundation.errors import ScenarioError
 from yawbench.orchestrator.recordings.measurement import load_measurement
 from yawbench.orchestrator.recordings.segment import Segment
-
-from .measured_files import GRAVITY, SIDE, SPEED, TIMES, YAW, described, read, refusal, rows, segment
 
 AIM = (
     '"Format","AiM CSV File"\r\n"Session","Airfield"\r\n"Vehicle","Car 7"\r\n"Racer","Nobody"\r\n'

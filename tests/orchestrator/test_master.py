@@ -4,13 +4,23 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
+from tests.orchestrator.fakes import (
+    Behaviour,
+    Clock,
+    Echo,
+    Function,
+    Integrator,
+    Mass,
+    Mixed,
+    Stage,
+    Witness,
+    make_plan,
+)
 from tests.refusals import refused
 from yawbench.foundation.errors import SimulationError
 from yawbench.orchestrator.master import step_loop, step_program
 from yawbench.orchestrator.master.simulate import simulate
 from yawbench.orchestrator.results.reader import load_results
-
-from .fakes import Behaviour, Clock, Echo, Function, Integrator, Mass, Mixed, Stage, Witness, make_plan
 
 
 def run(units, wires, out, **options):

@@ -10,8 +10,8 @@ import pyarrow.parquet as pq
 import pytest
 
 import yawbench as yb
-from tests.pages.made_up import unpacked
 from tests.refusals import each_mentions, mentions
+from tests.reports.made_up import unpacked
 from yawbench.cli import main
 from yawbench.foundation.errors import ResultsError, ScenarioError
 from yawbench.measured_cars.single_track import start_states

@@ -9,6 +9,7 @@ from ruamel.yaml import YAML
 
 from tests.cars import load_scenario, make_plan
 from tests.changed import changed
+from tests.fmus.fake_fmus import Var, make_fmu, out
 from tests.refusals import each_mentions, mentions, refused, texts_of
 from yawbench.commands.check import show
 from yawbench.components.cars.sprung_car import FourteenDofParameters, ride_of
@@ -16,8 +17,6 @@ from yawbench.foundation.errors import WiringError
 from yawbench.orchestrator.plan import ValueOrigin
 from yawbench.vehicles.derivations import DERIVATIONS, adapted, car_of, contradictions
 from yawbench.vocabulary.gravity import G
-
-from .fake_fmus import Var, make_fmu, out
 
 SALOON = Path(__file__).parents[2] / "scenarios" / "vehicles" / "large_saloon.yaml"
 

@@ -9,14 +9,13 @@ import yaml
 
 from tests.cars import load_scenario, make_plan
 from tests.changed import changed
-from tests.commands import status_of
+from tests.command_line import status_of
+from tests.fmus.fake_fmus import Var, make_fmu, out
 from tests.refusals import mentions
 from yawbench.foundation.errors import warnings_in
 from yawbench.vehicles.derivations import known_car
 from yawbench.vehicles.suspicious_values import suspicious_vehicle
 from yawbench.vocabulary.vehicle import CAR
-
-from .fake_fmus import Var, make_fmu, out
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 SCENARIO = """\

@@ -10,15 +10,25 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from tests.commands import status_of
+from tests.command_line import status_of
+from tests.orchestrator.measured_files import (
+    GRAVITY,
+    SIDE,
+    SPEED,
+    TIMES,
+    YAW,
+    described,
+    read,
+    refusal,
+    rows,
+    segment,
+)
 from yawbench.foundation.errors import InvalidValueError, ScenarioError
 from yawbench.orchestrator.recordings.clocks import seconds_of
 from yawbench.orchestrator.recordings.measurement import load_measurement
 from yawbench.orchestrator.recordings.segment import even_grid
 from yawbench.orchestrator.recordings.units_of_loggers import unit_in_file
 from yawbench.orchestrator.scenario.quantities import parse_unit
-
-from .measured_files import GRAVITY, SIDE, SPEED, TIMES, YAW, described, read, refusal, rows, segment
 
 SPEED_ALONE = {"velocity_x": "v"}
 ALL = {"velocity_x": "v", "yaw_rate": "r", "acceleration_y": "a"}

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from pydantic import BaseModel
 
+from tests.orchestrator.fakes import Clock, Function, Stage, make_plan
 from tests.refusals import each_mentions, mentions, refused, texts_of
 from yawbench.foundation.errors import ResultsError, SimulationError
 from yawbench.foundation.safe_files import write_whole
@@ -21,8 +22,6 @@ from yawbench.orchestrator.results.reader import load_results
 from yawbench.orchestrator.results.recorder import BLOCK, Recorder, recorder_of
 from yawbench.orchestrator.results.run_record import RunRecord
 from yawbench.orchestrator.results.salvage import salvage
-
-from .fakes import Clock, Function, Stage, make_plan
 
 
 def record(folder, table, *, real=None, others=None, run=None):

@@ -10,6 +10,9 @@ from pathlib import Path
 import pytest
 
 from tests.changed import changed
+from tests.fmus.fake_fmus import Var, make_fmu, out
+from tests.interop.test_ssp_units import archive, component, connector, wire
+from tests.orchestrator.test_foreign import write_fmu
 from yawbench.cli import main
 from yawbench.fmus.archive import open_fmu
 from yawbench.fmus.fmu import Variable
@@ -19,10 +22,6 @@ from yawbench.orchestrator.plan import Plan
 from yawbench.orchestrator.results.reader import load_results
 from yawbench.orchestrator.scenario.loader import load_scenario
 from yawbench.orchestrator.wiring.make_plan import make_plan
-
-from .fake_fmus import Var, make_fmu, out
-from .test_foreign import write_fmu
-from .test_ssp_units import archive, component, connector, wire
 
 pytestmark = pytest.mark.usefixtures("common_cache")
 

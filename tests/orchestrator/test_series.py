@@ -12,6 +12,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.fmus.fake_fmus import Var, make_fmu, out
+from tests.orchestrator.fakes import Behaviour, Stage
+from tests.orchestrator.fakes import make_plan as fake_plan
+from tests.orchestrator.recorded import car, write
 from tests.refusals import each_mentions, mentions, refused, texts_of
 from yawbench.cli import main
 from yawbench.foundation.errors import ResultsError, YawbenchError
@@ -24,11 +28,6 @@ from yawbench.orchestrator.results.reader import load_results
 from yawbench.orchestrator.scenario.loader import load_scenario
 from yawbench.orchestrator.wiring.make_plan import make_plan
 from yawbench.vocabulary.wheels import WHEELS
-
-from .fake_fmus import Var, make_fmu, out
-from .fakes import Behaviour, Stage
-from .fakes import make_plan as fake_plan
-from .recorded import car, write
 
 pytestmark = pytest.mark.usefixtures("common_cache")
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from tests.changed import changed
-from tests.commands import status_of
+from tests.command_line import status_of
 from yawbench.figures.display import LabelledRun
 from yawbench.figures.panels import panels_of
 from yawbench.metrics.expressions import evaluate, metric

@@ -5,12 +5,11 @@ from __future__ import annotations
 import pytest
 
 from tests.fmu_copies import put_fmus
+from tests.orchestrator.fakes import Clock, make_plan
 from tests.refusals import mentions
 from yawbench.cli import main
 from yawbench.orchestrator.results import file_formats
 from yawbench.orchestrator.results.file_formats import expected_size, size_note
-
-from .fakes import Clock, make_plan
 
 
 @pytest.fixture

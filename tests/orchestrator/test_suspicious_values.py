@@ -8,12 +8,11 @@ import pytest
 
 from tests.cars import load_scenario, make_plan
 from tests.changed import changed
+from tests.fmus.fake_fmus import Var, make_fmu, out
 from tests.refusals import each_mentions, mentions, refused
 from yawbench.foundation.errors import WiringError, warnings_in
 from yawbench.orchestrator.wiring.control_side import seen_as
 from yawbench.vocabulary.wheels import WHEELS
-
-from .fake_fmus import Var, make_fmu, out
 
 pytestmark = pytest.mark.usefixtures("common_cache")
 

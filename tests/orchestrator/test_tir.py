@@ -9,12 +9,11 @@ from math import isfinite
 
 import pytest
 
+from tests.orchestrator.tir_files import UNITS, text_of, write
 from tests.refusals import mentions, refused, texts_of
 from yawbench.components.tyre_models.pacejka_2012_set import COMMON, LONGITUDINAL, REST
 from yawbench.foundation.errors import ScenarioError
 from yawbench.vehicles.tir import read_tir
-
-from .tir_files import UNITS, text_of, write
 
 
 def values(path):

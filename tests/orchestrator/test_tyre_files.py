@@ -12,6 +12,7 @@ import pytest
 
 from tests.cars import load_scenario, make_plan
 from tests.changed import changed
+from tests.orchestrator.tir_files import write
 from tests.refusals import mentions, refused, texts_of
 from yawbench.cli import main
 from yawbench.foundation.errors import ScenarioError, WiringError, warnings_in
@@ -25,8 +26,6 @@ from yawbench.orchestrator.signal_names import Target
 from yawbench.reports.provenance import groups_of
 from yawbench.studies.experiment import plan_experiment
 from yawbench.studies.load_experiment import load_experiment
-
-from .tir_files import write
 
 UNITS = (
     "driver_force_pulse",

@@ -11,14 +11,13 @@ import pytest
 
 from tests.cars import load_scenario, make_plan
 from tests.changed import changed
+from tests.fmus.fake_fmus import Var, make_fmu, out
 from tests.refusals import each_mentions, mentions, places_of, texts_of
 from yawbench.fmus import opener
 from yawbench.foundation.errors import Diagnostic, Location, ModelDescriptionError, WiringError, YawbenchError
 from yawbench.orchestrator.plan import Instance, Override, Plan, ValueOrigin, Wire
 from yawbench.planner import Planner
 from yawbench.vocabulary.wheels import WHEELS
-
-from .fake_fmus import Var, make_fmu, out
 
 pytestmark = pytest.mark.usefixtures("common_cache")
 

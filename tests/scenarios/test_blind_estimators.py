@@ -12,7 +12,7 @@ import yaml
 
 import yawbench as yb
 from docs.generate import blind_tables
-from tests.commands import status_of
+from tests.command_line import status_of
 from tests.refusals import sentence_has
 from yawbench.studies.load_experiment import load_experiment
 

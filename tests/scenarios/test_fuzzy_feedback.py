@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.judged_studies import judge_all, judge_some, verdicts
 from tests.refusals import sentence_has
-from tests.studies import judge_all, judge_some, verdicts
 
 STUDY = Path(__file__).parents[2] / "scenarios" / "fuzzy_feedback" / "study.yaml"
 DEGREE = 0.017453292519943295

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from tests.changed import changed
-from tests.commands import status_of
+from tests.command_line import status_of
+from tests.judged_studies import check_figures, judge_all, judge_some, verdicts
 from tests.refusals import sentence_has
-from tests.studies import check_figures, judge_all, judge_some, verdicts
 from tests.verdicts import recorded
 from yawbench.figures.display import shown
 from yawbench.metrics.expressions import MetricValue

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from tests.changed import changed
+from tests.judged_studies import check_figures, judge_all, judge_some, verdicts
 from tests.refusals import sentence_has
-from tests.studies import check_figures, judge_all, judge_some, verdicts
 from tests.verdicts import recorded
 from yawbench.cli import main
 from yawbench.components.control_laws.sideslip_bound import PER_FRICTION, sideslip_bound

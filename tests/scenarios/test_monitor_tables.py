@@ -13,7 +13,7 @@ import yaml
 import yawbench as yb
 from docs.generate import monitor_tables
 from docs.generate.monitor_tables import GYRO, WHEEL, Outcome
-from tests.commands import status_of
+from tests.command_line import status_of
 from tests.refusals import sentence_has
 from yawbench.orchestrator.scenario import yaml_lines
 from yawbench.studies.confidence import share_bounds

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 import yawbench as yb
+from tests.judged_studies import check_figures, judge_all, judge_some, verdicts
 from tests.refusals import sentence_has
-from tests.studies import check_figures, judge_all, judge_some, verdicts
 from tests.verdicts import recorded
 from yawbench.components.cars.published_cars import PaperA
 from yawbench.figures.display import shown

@@ -9,7 +9,7 @@ from dataclasses import replace
 import pytest
 
 from docs.generate import matrix_tables
-from tests.commands import status_of
+from tests.command_line import status_of
 from tests.refusals import sentence_has
 from yawbench.ranking.ranking import ConditionSpec, load_ranking
 from yawbench.ranking.ranking_scores import EntryScore, RankedState, RankingResult, run_ranking

@@ -12,7 +12,7 @@ from statistics import fmean, median
 import pytest
 
 from docs.generate import threat_tables
-from tests.commands import status_of
+from tests.command_line import status_of
 from tests.refusals import sentence_has
 from yawbench.ranking import threats_page
 from yawbench.ranking.ranking import angle_experiment, angles_of

@@ -9,8 +9,8 @@ import pytest
 
 from tests.checkout import ROOT
 from tests.evidence import RECORD
+from tests.judged_studies import judge_all
 from tests.refusals import sentence_has
-from tests.studies import judge_all
 from tests.verdicts import FILE, KINDS, page, recorded, rows_of, studies, summary, table_in
 from yawbench.orchestrator.results.folder_names import default_folder
 from yawbench.studies.claim_schema import MetricReference

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from campaigns.kills import COMMANDS, trial
-from tests.orchestrator.test_batch_commands import UNITS
+from tests.commands.test_batch_commands import UNITS
 from yawbench.fmus.build import build_all
 
 

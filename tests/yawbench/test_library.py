@@ -16,8 +16,8 @@ import numpy as np
 import pytest
 
 import yawbench as yb
-from tests.pages.made_up import unpacked
 from tests.refusals import mentions, refused, texts_of
+from tests.reports.made_up import unpacked
 from yawbench._controller import PythonComponent
 from yawbench.cli import main
 from yawbench.components.controllers.fnn import Fnn

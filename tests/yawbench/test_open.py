@@ -8,7 +8,7 @@ import pytest
 from pyarrow import parquet
 
 import yawbench as yb
-from tests.commands import status_of
+from tests.command_line import status_of
 from yawbench.studies.result_files import columns_of, write_table
 
 

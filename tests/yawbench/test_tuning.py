@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import yawbench as yb
-from tests.commands import status_of
+from tests.command_line import status_of
 from tests.refusals import refused
 
 SMALL = {"population": 5, "generations": 2, "workers": 1}

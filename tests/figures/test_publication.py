@@ -1,0 +1,154 @@
+"""Figures for publication: format, size, fonts, and the caller's settings of matplotlib."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+from pathlib import Path
+from xml.etree import ElementTree
+
+import matplotlib
+import pytest
+from PIL import Image
+
+from tests.command_line import status_of
+from tests.orchestrator.recorded import car, write
+from tests.refusals import each_mentions
+from yawbench.figures.display import LabelledRun
+from yawbench.figures.plots import draw
+from yawbench.figures.style import LINES, STYLES
+
+SINGLE = ("--panel", "yaw_rate")
+FIVE = (*SINGLE, *("--panel=sideslip", "--panel=acceleration_y", "--panel=steer_angle", "--panel=path"))
+
+
+@pytest.fixture
+def run(tmp_path, monkeypatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    write(car(), tmp_path / "run")
+    return Path("run")
+
+
+def test_a_pdf_has_the_size_and_embedded_truetype_fonts(run):
+    assert status_of("plot", run, *SINGLE, "--size", "88x60mm", "--style", "ieee", "--out", "fig.pdf") == 0
+    text = Path("fig.pdf").read_bytes()
+    box = [float(one) for one in re.search(rb"/MediaBox \[([^]]*)\]", text)[1].split()]
+    assert box[2:] == pytest.approx([88 / 25.4 * 72, 60 / 25.4 * 72], abs=0.01)
+    assert b"/FontFile2" in text and b"/Type3" not in text
+    assert [path.name for path in Path().iterdir() if path.is_file()] == ["fig.pdf"]
+
+
+@pytest.mark.skipif(not shutil.which("pdffonts"), reason="pdffonts is not installed")
+@pytest.mark.sampled(1)
+@pytest.mark.parametrize("style", STYLES)
+def test_every_font_is_embedded(run, style):
+    assert status_of("plot", run, *SINGLE, "--style", style, "--out", "fig.pdf") == 0
+    listed = subprocess.run(["pdffonts", "fig.pdf"], capture_output=True, text=True, check=True).stdout
+    fonts = listed.splitlines()[2:]
+    assert fonts and all(" yes yes " in font for font in fonts)
+
+
+@pytest.mark.parametrize("kind", ["svg", pytest.param("png", marks=pytest.mark.exhaustive), "pdf"])
+def test_the_format_is_that_of_the_option_or_the_file(run, kind):
+    assert status_of("plot", run, *SINGLE, "--format", kind, "--out", "folder") == 0
+    assert status_of("plot", run, *SINGLE, "--out", f"one.{kind}") == 0
+    assert [path.name for path in Path("folder").iterdir()] == [f"overview.{kind}"]
+    assert Path(f"one.{kind}").read_bytes() == Path(f"folder/overview.{kind}").read_bytes()
+
+
+def test_a_png_has_the_pixels_of_its_size(run):
+    assert status_of("plot", run, *SINGLE, "--size", "4x3in", "--style", "slides", "--out", "fig.png") == 0
+    assert Image.open("fig.png").size == (600, 450)
+
+
+def test_a_size_that_is_none_is_refused(run, capsys):
+    for size in ("88", "88x60", "0x60mm", "88x9999mm"):
+        assert status_of("plot", run, *SINGLE, "--size", size) == 2
+    assert each_mentions(
+        capsys.readouterr().err,
+        ("--size 88", "0.5", "100 inches", "height"),
+        ("--size 88x60", "0.5", "100 inches", "height"),
+        ("--size 0x60mm", "0.5", "100 inches", "height"),
+        ("--size 88x9999mm", "0.5", "100 inches", "height"),
+    )
+
+
+def test_outputs_that_contradict_each_other_are_refused(run, capsys):
+    for options in (
+        ("--out", "fig.jpeg"),
+        ("--out", "fig.html"),
+        ("--out", "fig.svg", "--format", "pdf"),
+        ("--page", "--style", "ieee"),
+        ("--page", "--format", "pdf", "--out", "fig.pdf"),
+    ):
+        assert status_of("plot", run, *SINGLE, *options) == 2, options
+    assert each_mentions(
+        capsys.readouterr().err,
+        ("--out fig.jpeg", "figure"),
+        ("--out fig.html", "--page", "figure", "page"),
+        ("--out fig.svg", "--format", "pdf"),
+        ("--page", "--format", "--size", "--style"),
+        ("--page", "--format", "--size", "--style"),
+    )
+    assert not [path for path in Path().iterdir() if path.name.startswith("fig")]
+
+
+@pytest.mark.parametrize("style", ["ieee", pytest.param("elsevier", marks=pytest.mark.exhaustive)])
+def test_a_style_grows_with_its_panels(run, style):
+    assert status_of("plot", run, *FIVE, "--style", style, "--format", "svg", "--out", "five") == 0
+    wide, high = size_of("five/overview.svg")
+    assert status_of("plot", run, *SINGLE, "--style", style, "--format", "svg", "--out", "single") == 0
+    single = size_of("single/overview.svg")
+    assert wide == single[0] and high > 2 * single[1]
+
+
+def size_of(file: str) -> tuple[float, float]:
+    """Return width and height of an SVG file [pt]."""
+    root = ElementTree.parse(file).getroot()
+    return float(root.get("width").removesuffix("pt")), float(root.get("height").removesuffix("pt"))
+
+
+def test_panels_without_room_are_refused(run, capsys):
+    assert status_of("plot", run, "--style", "ieee", "--size", "88x40mm", "--out", "fig.pdf") == 2
+    assert each_mentions(capsys.readouterr().err, ("fig", "88", "40 mm", "--panel", "--size"))
+    assert not Path("fig.pdf").exists()
+
+
+LATEX = r"\documentclass{article}\usepackage{pgf}\begin{document}\input{fig.pgf}\end{document}"
+
+
+@pytest.mark.exhaustive  # LaTeX measures every text
+@pytest.mark.skipif(not shutil.which("xelatex"), reason="LaTeX is not installed")
+@pytest.mark.parametrize("panel", ["sideslip", "yaw_rate(sideslip)"])
+def test_pgf_is_a_figure_in_every_engine_of_latex(run, panel):
+    label = ("--label", "τ = −20 ms")
+    assert status_of("plot", run, "--panel", panel, *label, "--style", "ieee", "--out", "fig.pgf") == 0
+    text = Path("fig.pgf").read_text(encoding="utf-8")
+    assert text.count(r"\begin{pgfpicture}") == 1 and r"\beta" in text and str(Path.home()) not in text
+    for engine in filter(shutil.which, ("pdflatex", "xelatex", "lualatex")):
+        command = [engine, "-interaction=nonstopmode", "-halt-on-error", "-jobname=doc", LATEX]
+        done = subprocess.run(command, capture_output=True, text=True, errors="replace")
+        assert done.returncode == 0, done.stdout[-1500:]
+        assert "Missing character" not in Path("doc.log").read_text(errors="replace")
+
+
+@pytest.mark.skipif(bool(shutil.which("xelatex")), reason="LaTeX is installed")
+def test_pgf_without_latex_is_refused_in_a_sentence(run, capsys):
+    assert status_of("plot", run, *SINGLE, "--format", "pgf") == 2
+    assert each_mentions(capsys.readouterr().err, ("run/overview.pgf", "PGF", "LaTeX"))
+
+
+def test_the_callers_settings_of_matplotlib_hold():
+    runs = [LabelledRun("a", car()), LabelledRun("b", car(2.0))]
+    own = {"figure.figsize": (4.0, 3.0), "axes.grid": False, "font.size": 6, "lines.linewidth": 0.75}
+    with matplotlib.rc_context({**own, "axes.prop_cycle": matplotlib.cycler(color=["#123456", "#654321"])}):
+        figure = draw(runs, ["yaw_rate"])
+    assert figure.get_size_inches().tolist() == [4.0, 3.0]
+    lines = [line for line in figure.axes[0].get_lines() if line.get_color() in ("#123456", "#654321")]
+    assert len(lines) == 2
+    assert lines[0].get_linewidth() == pytest.approx(LINES[0]["linewidth"] / 2)
+    assert not figure.texts
+    with_ours = draw(runs, ["yaw_rate"])
+    assert with_ours.get_size_inches()[0] == 10.0 and with_ours.texts
+    assert [one.get_color() for one in with_ours.axes[0].get_lines()].count(LINES[0]["color"]) == 1

@@ -1,0 +1,427 @@
+"""Archives: unpacked once, whole, in a plain place; and the sentence for each that cannot be used."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import subprocess
+import sys
+import time
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.fmus.fake_fmus import Var, make_fmu, model_description, out
+from tests.refusals import mentions, refused
+from yawbench.fmus import archive as fmu_archive
+from yawbench.fmus import zip_members
+from yawbench.fmus.archive import open_fmu
+from yawbench.fmus.description import platform
+from yawbench.foundation.cache import KEEP_DAYS, cache_folder, delete_unused
+from yawbench.foundation.errors import ModelDescriptionError
+
+HERE, SUFFIX = platform()
+
+
+@pytest.fixture
+def fmu(tmp_path: Path, cache: Path) -> Path:
+    """An FMU with a variable of every kind, and a file in resources/."""
+    return make_fmu(
+        tmp_path / "tyre_a.fmu",
+        inputs=[Var("friction_*", minimum=0.0, maximum=2.0), Var("gear", type="Integer", start=1)],
+        outputs=[out("force_*", "friction_*", unit="N"), out("sum", unit="N", follows=None)],
+        parameters=[
+            Var("stiffness", "N/rad", start=5e4, minimum=1.0, description="Cornering stiffness"),
+            Var("mode", type="String", start="plain", choices=("plain", "similar")),
+            Var("lifted", type="Boolean", start=True),
+            Var("set", type="Enumeration", start=2, items=("dry", "wet")),
+        ],
+        files={"resources/table.txt": b"1 2 3"},
+    )
+
+
+def problem(path: Path) -> str:
+    with pytest.raises(ModelDescriptionError) as caught:
+        open_fmu(path)
+    assert caught.value.exit_status == 2
+    assert len(caught.value.diagnostics) == 1
+    assert "\n" not in str(caught.value)
+    return str(caught.value)
+
+
+def test_an_fmu_is_described_completely(fmu: Path) -> None:
+    opened = open_fmu(fmu)
+    assert (opened.name, opened.path, opened.guid) == ("tyre_a", fmu, "tyre_a")
+    assert (opened.model_identifier, opened.generation_tool) == ("tyre_a", "fake")
+    assert not opened.once_per_process
+    assert [v.name for v in opened.of("input")][:2] == ["friction_fl", "friction_fr"]
+    friction, force = opened.variables["friction_fl"], opened.variables["force_fl"]
+    assert (friction.type, friction.unit, friction.minimum, friction.maximum) == ("Real", "1", 0.0, 2.0)
+    assert (force.causality, force.unit, force.depends_on) == ("output", "N", ("friction_fl",))
+    assert force.follows("friction_fl")
+    assert not force.follows("friction_fr")
+    assert opened.variables["sum"].depends_on is None
+    assert opened.variables["sum"].follows("friction_rr")
+    stiffness = opened.variables["stiffness"]
+    assert (stiffness.start, stiffness.minimum, stiffness.description) == (5e4, 1.0, "Cornering stiffness")
+    assert opened.variables["mode"].choices == ("plain", "similar")
+    assert (opened.variables["lifted"].start, opened.variables["gear"].start) == (True, 1)
+    assert (opened.variables["set"].start, opened.variables["set"].items) == (2, {"dry": 1, "wet": 2})
+    assert opened.variables["gear"].discrete
+
+
+def test_files_are_unpacked_into_the_cache(fmu: Path, cache: Path) -> None:
+    opened = open_fmu(fmu)
+    assert opened.directory.is_relative_to(cache)
+    assert (opened.directory / "resources/table.txt").read_bytes() == b"1 2 3"
+    assert [entry.name for entry in cache.iterdir()] == [f"{opened.sha256[:32]}-{fmu_archive.FORMAT}"]
+
+
+def test_the_second_opening_reads_no_xml_and_gives_the_same(
+    fmu: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first = open_fmu(fmu)
+    monkeypatch.setattr(fmu_archive.fmu_description, "describe", None)
+    assert open_fmu(fmu) == first
+
+
+def test_equal_content_shares_one_entry_under_its_own_name(fmu: Path, cache: Path, tmp_path: Path) -> None:
+    copy = tmp_path / "other.fmu"
+    copy.write_bytes(fmu.read_bytes())
+    first, second = open_fmu(fmu), open_fmu(copy)
+    assert second.directory == first.directory
+    assert (second.name, second.path) == ("other", copy)
+    assert len(list(cache.iterdir())) == 1
+
+
+@pytest.mark.parametrize("harm", ["delete", "cut", "edit", "edit in place", "folder", "description"])
+def test_a_damaged_cache_entry_is_put_right(fmu: Path, harm: str) -> None:
+    opened = open_fmu(fmu)
+    file = opened.directory / "resources/table.txt"
+    if harm == "delete":
+        file.unlink()
+    elif harm == "cut":
+        file.write_bytes(b"1")
+    elif harm == "edit":
+        file.write_bytes(b"9 9 9")
+    elif harm == "edit in place":  # nothing but the content has changed
+        times = file.stat()
+        file.write_bytes(b"1 9 3")
+        os.utime(file, ns=(times.st_atime_ns, times.st_mtime_ns))
+    elif harm == "folder":
+        file.unlink()
+        file.mkdir()
+    else:
+        (opened.directory.parent / "description.json").write_text('{"fmu": {')
+    assert open_fmu(fmu) == opened
+    assert file.read_bytes() == b"1 2 3"
+    assert json.loads((opened.directory.parent / "description.json").read_text())["files"]
+
+
+def test_processes_that_unpack_at_the_same_time_do_not_collide(fmu: Path, cache: Path) -> None:
+    code = "import sys; from yawbench.fmus.archive import open_fmu; print(open_fmu(sys.argv[1]).directory)"
+    command = [sys.executable, "-c", code, str(fmu)]
+    started = [subprocess.Popen(command, stdout=subprocess.PIPE, text=True) for _ in range(2)]
+    said = {process.communicate()[0].strip() for process in started}
+    assert [process.returncode for process in started] == [0] * 2
+    assert said == {str(open_fmu(fmu).directory)}
+    assert len(list(cache.iterdir())) == 1
+
+
+def test_an_entry_made_meanwhile_by_another_process_is_used(
+    fmu: Path, cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    opened = open_fmu(fmu)
+    found = iter([None, opened])
+    monkeypatch.setattr(fmu_archive, "_load", lambda entry, path: next(found))
+    assert open_fmu(fmu) == opened
+    assert len(list(cache.iterdir())) == 1
+
+
+def test_entries_unused_for_long_are_deleted(fmu: Path, cache: Path, tmp_path: Path) -> None:
+    old = open_fmu(fmu).directory.parent
+    left_over = cache / ".unpacking-x"
+    left_over.mkdir()
+    foreign = cache / "not ours"
+    foreign.mkdir()
+    long_ago = time.time() - (KEEP_DAYS + 1) * 86400.0
+    for folder in (old, left_over, foreign):
+        os.utime(folder, (long_ago, long_ago))
+    delete_unused.cache_clear()  # as in another process
+    new = open_fmu(make_fmu(tmp_path / "b.fmu")).directory.parent
+    assert sorted(cache.iterdir()) == sorted([new, foreign])
+
+
+def test_an_archive_in_a_path_with_spaces_and_umlauts_is_opened(fmu: Path, tmp_path: Path) -> None:
+    path = tmp_path / "Prüfstand für Räder" / "tyre ä.fmu"
+    path.parent.mkdir()
+    fmu.rename(path)
+    opened = open_fmu(path)
+    assert opened.path == path
+    assert str(opened.directory).isascii()
+
+
+@pytest.mark.parametrize("name", ["Größe", "50 %", "a#b", "käse"])
+def test_a_cache_whose_path_is_not_plain_ascii_is_passed_over(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("YAWBENCH_CACHE", str(tmp_path / name))
+    monkeypatch.setattr("tempfile.gettempdir", lambda: str(tmp_path / "temporary"))
+    folder = cache_folder()
+    assert folder.parent == tmp_path / "temporary"
+    assert folder.name.startswith("yawbench-")
+    assert folder.stat().st_mode & 0o777 == 0o700
+
+
+def test_a_temporary_cache_of_another_user_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("YAWBENCH_CACHE", str(tmp_path / "ä"))
+    monkeypatch.setattr("tempfile.gettempdir", lambda: str(tmp_path))
+    monkeypatch.setenv("PUBLIC", str(tmp_path))
+    owner = os.getuid()
+    (tmp_path / f"yawbench-{owner + 1}").mkdir()
+    monkeypatch.setattr("os.getuid", lambda: owner + 1)
+    with pytest.raises(ModelDescriptionError) as caught:
+        cache_folder()
+    assert caught.value.code == "cache-unwritable"
+    assert mentions(str(caught.value), "yawbench-1", "YAWBENCH_CACHE", "FMUs")
+
+
+def test_no_plain_folder_at_all_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("YAWBENCH_CACHE", str(tmp_path / "ä"))
+    monkeypatch.setenv("PUBLIC", "/ö")
+    monkeypatch.setattr("tempfile.gettempdir", lambda: "/ü")
+    with pytest.raises(ModelDescriptionError) as caught:
+        cache_folder()
+    assert caught.value.code == "cache-unwritable"
+    assert mentions(str(caught.value), "ä", "YAWBENCH_CACHE", "FMUs")
+
+
+def test_a_missing_fmu_is_said_with_a_guess(fmu: Path, tmp_path: Path) -> None:
+    missing = tmp_path / "tyre_b.fmu"
+    assert mentions(problem(missing), "tyre_b.fmu", "'tyre_a.fmu'")
+    missing = tmp_path / "plant.fmu"
+    assert mentions(problem(missing), "plant.fmu", "tyre_a.fmu")
+
+
+def test_a_file_that_is_no_zip_is_said(fmu: Path) -> None:
+    fmu.write_text("hello")
+    assert mentions(problem(fmu), "tyre_a.fmu", "zip", "archive")
+
+
+def test_an_archive_that_was_cut_off_is_said(fmu: Path) -> None:
+    fmu.write_bytes(fmu.read_bytes()[:-40])
+    assert mentions(problem(fmu), "tyre_a.fmu", "File")
+
+
+def test_an_archive_with_a_flipped_byte_is_said(tmp_path: Path, cache: Path) -> None:
+    path = tmp_path / "a.fmu"
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_STORED) as archive:
+        archive.writestr("modelDescription.xml", model_description("a"))
+    path.write_bytes(path.read_bytes().replace(b"fmiVersion", b"fmiVersiom", 1))
+    assert mentions(problem(path), "a.fmu", "Bad", "CRC", "'modelDescription.xml'")
+
+
+def test_every_cut_of_an_archive_gives_one_sentence(fmu: Path, cache: Path) -> None:
+    raw = fmu.read_bytes()
+    for length in range(0, len(raw), 97):
+        fmu.write_bytes(raw[:length])
+        assert problem(fmu).startswith(f"{fmu}: ")
+    assert not list(cache.glob("*"))
+
+
+def test_a_zip_that_is_no_fmu_is_said(tmp_path: Path, cache: Path) -> None:
+    path = tmp_path / "a.fmu"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("readme.txt", "hello")
+    assert mentions(problem(path), "a.fmu", "modelDescription.xml")
+
+
+@pytest.mark.parametrize("name", ["../evil.txt", "/etc/evil.txt", "resources/../../evil.txt", "C:/evil.txt"])
+def test_an_archive_that_reaches_out_of_its_folder_is_refused(name: str, tmp_path: Path, cache: Path) -> None:
+    path = make_fmu(tmp_path / "a.fmu", files={name: b"evil"})
+    assert mentions(problem(path), "a.fmu", f"'{name}'")
+    assert not list(tmp_path.rglob("evil.txt"))
+
+
+@pytest.mark.parametrize(
+    ("xml", "expected"),
+    [
+        (
+            "<fmiModelDescription",
+            "modelDescription.xml is not well-formed XML: unclosed token: line 1, column 0",
+        ),
+        (
+            '<html fmiVersion="2.0"/>',
+            "modelDescription.xml is not an FMI model description; "
+            "supported are FMI 2.0 and 3.0 for co-simulation",
+        ),
+        (
+            '<fmiModelDescription fmiVersion="1.0"/>',
+            "an FMU of FMI 1.0; supported are FMI 2.0 and 3.0 for co-simulation",
+        ),
+        (
+            '<fmiModelDescription fmiVersion="4.0"><CoSimulation/></fmiModelDescription>',
+            "an FMU of FMI 4.0; supported are FMI 2.0 and 3.0 for co-simulation",
+        ),
+        (
+            '<fmiModelDescription fmiVersion="2.0"><ModelExchange/></fmiModelDescription>',
+            "an FMU for model exchange only; supported are FMI 2.0 and 3.0 for co-simulation",
+        ),
+        (
+            model_description("a").replace('guid="a"', ""),
+            "the model description is not valid FMI 2.0: ERROR (line 2, column 0): Element "
+            "'fmiModelDescription': The attribute 'guid' is required but missing"
+            "; 'validate: false' for the instance (--set INSTANCE.validate=false) makes it a warning",
+        ),
+        (
+            model_description("a", outputs=["x", "x"]),
+            'the model description is not valid FMI 2.0: The variable name "x" (line 7) is not unique; '
+            "'validate: false' for the instance (--set INSTANCE.validate=false) makes it a warning",
+        ),
+        (
+            model_description("a", outputs=["x"]).replace('index="1"', 'index="7"'),
+            "the model description cannot be used: index of Unknown names variable number '7', "
+            "but there are 1",
+        ),
+        (
+            model_description("a", outputs=["x"]).replace('index="1"', 'index="0"'),
+            "the model description cannot be used: index of Unknown names variable number '0', "
+            "but there are 1",
+        ),
+        (
+            model_description("a", ["u"], [out("x", "u")]).replace('dependencies="1"', 'dependencies="1 9"'),
+            "the model description cannot be used: dependencies of Unknown names variable number '9', "
+            "but there are 2",
+        ),
+        (
+            model_description("a", outputs=["x"]).replace(' valueReference="1"', ""),
+            "the model description cannot be used: it is not valid FMI 2.0: ERROR (line 6, column 0): "
+            "Element 'ScalarVariable': The attribute 'valueReference' is required but missing",
+        ),
+        (
+            model_description("a").replace("UTF-8", "UTF-7"),
+            "modelDescription.xml has an encoding that cannot be read (multi-byte encodings are not "
+            "supported); FMI asks for UTF-8",
+        ),
+        (
+            model_description("a").replace("UTF-8", "KLINGON"),
+            "modelDescription.xml has an encoding that cannot be read (unknown encoding: KLINGON); FMI asks "
+            "for UTF-8",
+        ),
+    ],
+)
+def test_a_model_description_that_cannot_be_used_is_said(
+    xml: str, expected: str, tmp_path: Path, cache: Path
+) -> None:
+    path = make_fmu(tmp_path / "a.fmu", xml=xml)
+    assert problem(path) == f"{path}: {expected}"
+
+
+def test_a_missing_binary_is_said_with_those_there_are(tmp_path: Path, cache: Path) -> None:
+    path = make_fmu(tmp_path / "a.fmu", binaries=["win64x", "darwin65"])
+    assert mentions(problem(path), "a.fmu", "binaries/linux64/a.so", "darwin65", "win64x")
+    path = make_fmu(tmp_path / "a.fmu", binaries=[])
+    assert mentions(problem(path), "a.fmu", "binaries/linux64/a.so")
+
+
+def test_a_binary_of_another_name_is_said_with_the_name_that_is_expected(tmp_path: Path, cache: Path) -> None:
+    path = tmp_path / "a.fmu"
+    make_fmu(path, binaries=[], files={f"binaries/{HERE}/b{SUFFIX}": b"", f"binaries/{HERE}/c.txt": b""})
+    assert mentions(problem(path), "a.fmu", "binaries/linux64/a.so", "b.so", "c.txt")
+
+
+def test_a_full_disk_is_said_and_leaves_nothing_half_done(
+    fmu: Path, cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def write_bytes(self: Path, content: bytes) -> int:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("tempfile.gettempdir", lambda: str(tmp_path))
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "write_bytes", write_bytes)
+        assert mentions(problem(fmu), "tyre_a.fmu", "cache", "YAWBENCH_CACHE")
+    assert list(cache.iterdir()) == []
+    assert open_fmu(fmu).name == "tyre_a"
+
+
+def test_a_cache_that_cannot_be_written_is_said_if_there_is_no_other(
+    fmu: Path, cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    cache.write_text("a file in its place")
+    monkeypatch.setattr("tempfile.gettempdir", lambda: "/ü")
+    monkeypatch.setenv("PUBLIC", "/ö")
+    assert mentions(problem(fmu), "tyre_a.fmu", "cache", "YAWBENCH_CACHE")
+
+
+def test_a_full_cache_serves_although_it_cannot_be_written(
+    fmu: Path, cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first = open_fmu(fmu)
+
+    def refuse(*args: Any, **kwargs: Any) -> None:
+        raise PermissionError(errno.EACCES, "Permission denied")
+
+    monkeypatch.setattr(os, "utime", refuse)
+    monkeypatch.setattr(fmu_archive.tempfile, "mkdtemp", refuse)
+    assert open_fmu(fmu) == first
+
+
+def test_modules_of_a_pythonfmu_unit_are_listed_with_their_content(tmp_path: Path, cache: Path) -> None:
+    files: dict[str, Any] = {
+        "resources/slavemodule.txt": b"entry",
+        "resources/entry.py": b"1",
+        "resources/helpers/__init__.py": b"",
+        "resources/helpers/deep/more.py": b"2",
+        "resources/pythonfmu/__init__.py": b"",
+        "resources/data.csv": b"",
+    }
+    first = open_fmu(make_fmu(tmp_path / "a.fmu", files=files))
+    second = open_fmu(make_fmu(tmp_path / "b.fmu", files=files | {"resources/helpers/deep/more.py": b"3"}))
+    assert set(first.python_modules) == {"entry", "helpers"}
+    assert first.python_modules["entry"] == second.python_modules["entry"]
+    assert first.python_modules["helpers"] != second.python_modules["helpers"]
+
+
+@pytest.mark.parametrize(
+    "identifier", ["../../../../outside/thief", "/tmp/thief", "a\\b", "a/b", "..", "C:thief", "x" * 300, ""]
+)
+def test_an_identifier_that_leads_out_of_the_archive_is_refused(
+    identifier: str, tmp_path: Path, cache: Path
+) -> None:
+    path = make_fmu(tmp_path / "a.fmu", outputs=[out("force", unit="N")])
+    with zipfile.ZipFile(path) as archive:
+        content = {name: archive.read(name) for name in archive.namelist()}
+    xml = content["modelDescription.xml"].decode()
+    assert 'modelIdentifier="a"' in xml
+    content["modelDescription.xml"] = xml.replace(
+        'modelIdentifier="a"', f'modelIdentifier="{identifier}"'
+    ).encode()
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, data in content.items():
+            archive.writestr(name, data)
+    assert "modelIdentifier" in problem(path)
+
+
+@pytest.mark.usefixtures("cache")
+def test_an_archive_that_unpacks_without_limit_is_refused_before_it_is_unpacked(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = make_fmu(tmp_path / "bomb.fmu", files={"resources/zeros": bytes(3_000_000)})
+    assert path.stat().st_size < 10_000
+    monkeypatch.setattr(zip_members, "UNPACKED", 2_000_000)
+    monkeypatch.setattr(zipfile.ZipFile, "read", lambda *_: pytest.fail("a member was unpacked"))
+    with refused(ModelDescriptionError, "fmu-damaged", names=("bomb.fmu", "3 MB", "2 MB")):
+        open_fmu(path)
+
+
+@pytest.mark.usefixtures("cache")
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes with names here")
+def test_a_pipe_in_place_of_an_fmu_is_not_waited_for(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.fmu")
+    with refused(ModelDescriptionError, "fmu-damaged", names=("pipe.fmu", "socket", "device")):
+        open_fmu(tmp_path / "pipe.fmu")

@@ -1,0 +1,241 @@
+"""Components of installed packages, and FMUs in folders that the environment names."""
+
+from __future__ import annotations
+
+import hashlib
+import shutil
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.commands.test_batch_commands import SCENARIO
+from tests.refusals import each_mentions, mentions
+from yawbench.fmus import opener
+from yawbench.fmus.opener import HOME
+from yawbench.orchestrator.results.reader import Results, load_results
+
+UNITS = ("driver_sine", "reference_steady_state", "controller_off", "controller_fuzzy_sideslip")
+LAW = '''
+"""A proportional law, with a gain from a file beside it."""
+
+from yawbench.components.fmi.component import Component
+
+from tests.orchestrator._gains import GAIN
+
+
+class Follow(Component):
+    """Holds the yaw rate."""
+
+    inputs = ("yaw_rate_ref",)
+    outputs = ("yaw_moment",)
+
+    def output(self, t, u):
+        return (GAIN * u[0],)
+'''
+Install = Callable[..., Path]
+
+
+@pytest.fixture(scope="module")
+def shared(tmp_path_factory) -> Path:
+    """A cache for all tests: what is compiled of the sample is the same in most."""
+    return tmp_path_factory.mktemp("cache")
+
+
+@pytest.fixture
+def cache(shared, monkeypatch) -> Path:
+    """A cache without FMUs, in place of the user's."""
+    shutil.rmtree(shared / "fmus", ignore_errors=True)
+    monkeypatch.setenv("YAWBENCH_CACHE", str(shared))
+    return shared
+
+
+@pytest.fixture
+def install(tmp_path, monkeypatch, cache) -> Iterator[Install]:
+    """Install a sample package, as an installer would leave it on Python's path."""
+    site = tmp_path / "site"
+    site.mkdir()
+    monkeypatch.syspath_prepend(site)
+
+    def make(distribution: str = "my-laws", *, name: str = "follow", gain: float = 3.0, of: str = "") -> Path:
+        package = distribution.replace("-", "_")
+        controllers = site / package / "components" / "controllers"
+        controllers.mkdir(parents=True)
+        (controllers / f"{name}.py").write_text(LAW)
+        (controllers / "_gains.py").write_text(f"GAIN = {gain}\n")
+        info = site / f"{package}-1.0.dist-info"
+        info.mkdir()
+        (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {distribution}\nVersion: 1.0\n")
+        (info / "entry_points.txt").write_text(f"[{opener.GROUP}]\nlaws = {of or f'{package}.components'}\n")
+        opener.packaged_components.cache_clear()
+        return controllers
+
+    yield make
+    opener.packaged_components.cache_clear()
+    for module in [name for name in sys.modules if name.partition(".")[0] in ("my_laws", "your_laws")]:
+        del sys.modules[module]
+
+
+@pytest.fixture
+def yawbench(yawbench, fmus, tmp_path, monkeypatch):
+    """Run the command line in a folder with a scenario and its folder of FMUs."""
+    work = tmp_path / "work"
+    work.mkdir()
+    shutil.copytree(fmus, work / "fmus")
+    (work / "half.yaml").write_text(SCENARIO)
+    monkeypatch.chdir(work)
+    return yawbench
+
+
+def gain_in(run: Results) -> float:
+    """Return the ratio of the peaks of output and input."""
+    return float(abs(run.find("yaw_moment")).max() / abs(run.find("yaw_rate_ref")).max())
+
+
+def test_a_component_of_a_package_is_found_built_and_run(install, yawbench, cache):
+    install()
+    status, _, said = yawbench(
+        "run", "half.yaml", "--swap", "controller=controller_follow", "--out", "results/one"
+    )
+    assert status == 0, said
+    assert mentions(said.splitlines()[0], "controller_follow", "my")
+    run = load_results(Path("results/one"))
+    assert gain_in(run) == pytest.approx(3.0, rel=0.01)
+    assert (cache / "fmus").is_dir()
+    assert sorted(path.name for path in Path("fmus").iterdir()) == sorted(f"{name}.fmu" for name in UNITS)
+
+
+def test_it_is_built_again_when_a_file_beside_it_has_changed(install, yawbench):
+    controllers = install()
+    swap = ("--swap", "controller=controller_follow")
+    assert yawbench("run", "half.yaml", *swap)[0] == 0
+    _, _, said = yawbench("run", "half.yaml", *swap)
+    assert "built" not in said
+    (controllers / "_gains.py").write_text("GAIN = 5.0\n")
+    _, _, said = yawbench("run", "half.yaml", *swap, "--out", "results/two")
+    assert "controller_follow: built" in said
+    run = load_results(Path("results/two"))
+    assert gain_in(run) == pytest.approx(5.0, rel=0.01)
+
+
+def test_without_building_it_is_said_how_to_build_it(install, yawbench):
+    install()
+    command = ("run", "half.yaml", "--swap", "controller=controller_follow", "--no-build")
+    status, _, said = yawbench(*command)
+    assert status == 2
+    assert each_mentions(
+        said, ("--swap controller=controller_follow", "'yawbench build controller_follow'", "my")
+    )
+    status, _, said = yawbench("build", "controller_follow")
+    assert status == 0
+    assert mentions(said, "controller_follow", "my")
+    assert yawbench(*command)[0] == 0
+
+
+def test_it_is_suggested_and_listed(install, yawbench):
+    install()
+    _, _, said = yawbench("run", "half.yaml", "--swap", "controller=controller_folow")
+    assert mentions(said, "'controller_follow'")
+    status, out, _ = yawbench("list", "fmus")
+    assert status == 0
+    assert "controller_follow" in out
+    assert "controller_off" in out
+
+
+def test_a_name_that_is_also_in_the_folder_is_told_and_the_folder_counts(install, yawbench):
+    install(name="off")
+    status, _, said = yawbench("check", "half.yaml", "--swap", "controller=controller_off")
+    assert status == 0
+    assert mentions(
+        next(line for line in said.splitlines() if "the package my-laws" in line),
+        "note",
+        "controller_off",
+        "fmus",
+        "my",
+    )
+    assert yawbench("run", "half.yaml", "--swap", "controller=controller_off", "--out", "results/off")[0] == 0
+    assert not load_results(Path("results/off")).find("yaw_moment").any()
+
+
+def test_a_name_in_two_packages_is_refused(install, yawbench):
+    install()
+    install("your-laws", gain=4.0)
+    status, _, said = yawbench("run", "half.yaml", "--swap", "controller=controller_follow")
+    assert status == 2
+    assert each_mentions(said, ("--swap controller=controller_follow", "my", "your"))
+
+
+def test_an_entry_point_that_names_nothing_is_told_with_its_package(install, yawbench):
+    install(of="my_laws.parts")
+    status, _, said = yawbench("run", "half.yaml", "--swap", "controller=controller_follow")
+    assert status == 2
+    assert each_mentions(
+        said, ("--swap controller=controller_follow", "'laws'", "yawbench.components", "'my_laws.parts'")
+    )
+
+
+def test_folders_of_the_environment_come_after_the_nearest(yawbench, tmp_path, monkeypatch):
+    first, second = tmp_path / "first", tmp_path / "second"
+    first.mkdir()
+    second.mkdir()
+    shutil.copy("fmus/controller_off.fmu", first / "controller_mine.fmu")
+    shutil.copy("fmus/controller_fuzzy_sideslip.fmu", second / "controller_mine.fmu")
+    shutil.copy("fmus/controller_off.fmu", second / "controller_off.fmu")
+    monkeypatch.setenv(opener.FOLDERS, f"{first}:{second}")
+    status, _, said = yawbench(
+        "run", "half.yaml", "--swap", "controller=controller_mine", "--out", "results/mine"
+    )
+    assert status == 0
+    assert mentions(
+        next(line for line in said.splitlines() if "/first" in line),
+        "note",
+        "controller_mine",
+        "first",
+        "second",
+    )
+    assert not load_results(Path("results/mine")).find("yaw_moment").any()
+    _, _, said = yawbench("check", "half.yaml", "--swap", "controller=controller_off")
+    assert mentions(
+        next(line for line in said.splitlines() if "/second" in line),
+        "note",
+        "controller_off",
+        "fmus",
+        "second",
+    )
+    status, out, _ = yawbench("list", "fmus")
+    assert "controller_mine" in out
+
+
+def test_a_folder_of_the_environment_that_is_not_there_is_told(yawbench, tmp_path, monkeypatch):
+    monkeypatch.setenv(opener.FOLDERS, str(tmp_path / "nothing"))
+    status, _, said = yawbench("run", "half.yaml", "--swap", "controller=controller_mine")
+    assert status == 2
+    assert each_mentions(said, ("--swap controller=controller_mine", "YAWBENCH_FMUS", "nothing"))
+
+
+def test_nothing_is_searched_where_every_name_is_in_the_folder(yawbench, monkeypatch):
+    def searched():
+        raise AssertionError
+
+    monkeypatch.setattr(opener, "packaged_components", searched)
+    assert yawbench("run", "half.yaml")[0] == 0
+
+
+def test_a_folder_with_a_suppliers_fmu_alone_is_enough(yawbench, tmp_path, fmus):
+    folder = tmp_path / "work" / "fmus"
+    shutil.copy(fmus / "controller_off.fmu", tmp_path / "controller_bought.fmu")
+    shutil.rmtree(folder)
+    folder.mkdir()
+    shutil.move(tmp_path / "controller_bought.fmu", folder)
+    assert yawbench("run", "half.yaml", "--swap", "controller=controller_bought", "--out", "out")[0] == 0
+    used = {fmu.name: fmu.sha256 for fmu in load_results(Path("out")).record.fmus.values()}
+    own = {name: sha256(HOME / f"{name}.fmu") for name in used if name != "controller_bought"}
+    assert used == {**own, "controller_bought": sha256(folder / "controller_bought.fmu")}
+    status, _, told = yawbench("run", "half.yaml", "--swap", "controller=controller_offf")
+    assert status == 2
+    assert "did you mean 'controller_off'? there are: controller_bought, controller_dead_band" in told
+
+
+def sha256(file: Path) -> str:
+    return hashlib.sha256(file.read_bytes()).hexdigest()

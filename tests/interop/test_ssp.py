@@ -1,0 +1,473 @@
+"""Scenarios as SSP archives: valid, complete, and the same numbers when they are read back."""
+
+from __future__ import annotations
+
+import re
+import zipfile
+from copy import deepcopy
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+
+import fmpy.ssp
+import pytest
+from lxml import etree
+
+from tests.cars import load_scenario, make_plan
+from tests.changed import changed
+from tests.fmus.fake_fmus import make_fmu
+from tests.refusals import mentions, texts_of
+from yawbench.cli import main
+from yawbench.foundation.errors import ResultsError, YawbenchError
+from yawbench.interop.ssp_write import for_omsimulator, write_ssp
+from yawbench.orchestrator.master.simulate import simulate
+from yawbench.orchestrator.scenario.loader import files
+from yawbench.orchestrator.scenario.ssp_archive import DESCRIPTION_FILE, SSC, SSD, SSM, SSV
+
+SCENARIOS = Path(__file__).parents[2] / "scenarios"
+PAPERS = (
+    "fnn_sideslip/25mps.yaml",
+    "fuzzy_sliding_mode/high_friction.yaml",
+    "fuzzy_pid/sine.yaml",
+    "fuzzy_feedback/single_sine.yaml",
+)
+SCHEMAS = Path(fmpy.ssp.__file__).parent / "schema"
+
+
+@pytest.fixture(scope="module")
+def feedback(fmus, tmp_path_factory):
+    """An archive of the smallest scenario."""
+    path = tmp_path_factory.mktemp("ssp") / "feedback.ssp"
+    write_ssp(plan_of(SCENARIOS / PAPERS[3], fmus), path)
+    return path
+
+
+def plan_of(path, fmus, **options):
+    return make_plan(load_scenario(path, changes=changed(stop_time=0.6, **options)), fmus=fmus)
+
+
+def results_of(plan, folder):
+    simulate(plan, folder)
+    return (folder / "results.csv").read_bytes()
+
+
+def rewritten(archive, target, *changes, without=()):
+    """Copy an archive with pieces of its description replaced."""
+    with zipfile.ZipFile(archive) as old, zipfile.ZipFile(target, "w") as new:
+        for name in old.namelist():
+            content = old.read(name)
+            if name == DESCRIPTION_FILE:
+                for before, after in changes:
+                    assert before.encode() in content
+                    content = content.replace(before.encode(), after.encode())
+            if name not in without:
+                new.writestr(name, content)
+    return target
+
+
+def described(archive):
+    with zipfile.ZipFile(archive) as held:
+        return etree.fromstring(held.read(DESCRIPTION_FILE))
+
+
+def redescribed(archive, target, root, members=None):
+    """Copy an archive with another description, and more members."""
+    with zipfile.ZipFile(archive) as old, zipfile.ZipFile(target, "w") as new:
+        for name in old.namelist():
+            if name not in (members or {}):
+                new.writestr(name, etree.tostring(root) if name == DESCRIPTION_FILE else old.read(name))
+        for name, content in (members or {}).items():
+            new.writestr(name, content)
+    return target
+
+
+def parameter_set(name, value, unit="m/s"):
+    return (
+        f'<ssv:ParameterSet xmlns:ssv="{SSV}" version="1.0" name="v"><ssv:Parameters>'
+        f'<ssv:Parameter name="{name}"><ssv:Real value="{value}" unit="{unit}"/></ssv:Parameter>'
+        "</ssv:Parameters></ssv:ParameterSet>"
+    )
+
+
+def bound(inner, **attributes):
+    """Return the bindings of an element as text, with one binding."""
+    listed = "".join(f' {key}="{value}"' for key, value in attributes.items())
+    return (
+        f"<ssd:ParameterBindings><ssd:ParameterBinding{listed}>{inner}"
+        "</ssd:ParameterBinding></ssd:ParameterBindings>"
+    )
+
+
+def unit_of(plan, name):
+    return next(unit for unit in plan.instances if unit.name == name)
+
+
+def problem(archive, fmus, **options):
+    with pytest.raises(YawbenchError) as error:
+        make_plan(load_scenario(archive, changes=changed(**options)), fmus=fmus)
+    (sentence,) = texts_of(error.value)
+    return sentence
+
+
+def every_scenario():
+    """Return the names of the scenarios, those of the papers first."""
+    known = (path.relative_to(SCENARIOS).as_posix() for path, _ in files(SCENARIOS, ["a scenario"]))
+    return list(dict.fromkeys([*PAPERS, *known]))
+
+
+@pytest.mark.parametrize("scenario", every_scenario())
+@pytest.mark.sampled(2)
+def test_a_round_trip_gives_the_same_numbers_to_the_last_bit(scenario, fmus, tmp_path):
+    plan = plan_of(SCENARIOS / scenario, fmus)
+    write_ssp(plan, tmp_path / "system.ssp")
+    back = make_plan(load_scenario(tmp_path / "system.ssp"))
+    assert back.n_steps == plan.n_steps
+    assert back.algorithm == plan.algorithm
+    assert set(back.wires) == set(plan.wires)
+    assert [unit.constants for unit in back.instances] == [unit.constants for unit in plan.instances]
+    assert [unit.period for unit in back.instances] == [unit.period for unit in plan.instances]
+    assert results_of(back, tmp_path / "back") == results_of(plan, tmp_path / "plan")
+
+
+@pytest.mark.parametrize("scenario", PAPERS)
+@pytest.mark.parametrize("standard", ["1.0", "2.0"])
+@pytest.mark.parametrize("adapted", [False, True], ids=["all", "omsimulator"])
+@pytest.mark.sampled(2)
+def test_an_archive_is_valid_against_the_schemas_of_ssp(scenario, standard, adapted, fmus, tmp_path):
+    """Version 2.0 differs here from 1.0 by the number alone."""
+    plan = plan_of(SCENARIOS / scenario, fmus)
+    write_ssp(for_omsimulator(plan)[0] if adapted else plan, tmp_path / "system.ssp", standard)
+    with zipfile.ZipFile(tmp_path / "system.ssp") as archive:
+        description = etree.fromstring(archive.read(DESCRIPTION_FILE))
+        held = set(archive.namelist())
+    assert re.fullmatch(r"[A-Za-z_]\w*", description.get("name"), re.ASCII)
+    for one in (description, *description.iterfind(".//{*}ParameterSet")):
+        assert one.get("version") == standard
+        one.set("version", "1.0")
+    etree.XMLSchema(file=str(SCHEMAS / "SystemStructureDescription.xsd")).assertValid(description)
+    values = etree.XMLSchema(file=str(SCHEMAS / "SystemStructureParameterValues.xsd"))
+    sets = description.findall(".//{*}ParameterSet")
+    assert sets
+    for one in sets:
+        values.assertValid(etree.fromstring(etree.tostring(one)))
+    sources = {one.get("source") for one in description.iter(f"{{{SSD}}}Component")}
+    assert sources <= held
+
+
+def test_the_command_exports_and_run_runs_what_it_exports(fmus, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    scenario, folder = str(SCENARIOS / PAPERS[3]), str(fmus)
+    for arguments in (
+        ["export-ssp", scenario, "--fmus", folder, "--swap", "controller=controller_off"],
+        ["run", "single_sine.ssp", "--out", "from_ssp"],
+        ["run", scenario, "--fmus", folder, "--swap", "controller=controller_off", "--out", "from_yaml"],
+    ):
+        with pytest.raises(SystemExit) as exit_:
+            main(arguments)
+        assert not exit_.value.code
+    numbers = [(tmp_path / name / "results.csv").read_bytes() for name in ("from_ssp", "from_yaml")]
+    assert numbers[0] == numbers[1]
+
+
+def test_units_of_an_archive_are_swapped_and_set_as_those_of_a_scenario(feedback, fmus, tmp_path):
+    swapped = plan_of(
+        feedback, fmus, swaps=["controller=controller_off"], settings=["plant.initial_speed=80 km/h"]
+    )
+    same = plan_of(
+        SCENARIOS / PAPERS[3],
+        fmus,
+        swaps=["controller=controller_off"],
+        settings=["plant.initial_speed=80 km/h"],
+    )
+    assert results_of(swapped, tmp_path / "a") == results_of(same, tmp_path / "b")
+
+
+def test_an_archive_of_an_archive_is_the_same_to_the_last_byte(feedback, fmus, tmp_path):
+    write_ssp(make_plan(load_scenario(feedback)), tmp_path / "again.ssp")
+    assert (tmp_path / "again.ssp").read_bytes() == feedback.read_bytes()
+
+
+def test_a_text_that_xml_cannot_hold_is_refused(fmus, tmp_path):
+    plan = replace(plan_of(SCENARIOS / PAPERS[3], fmus), title="bell \a")
+    with pytest.raises(ResultsError) as caught:
+        write_ssp(plan, tmp_path / "system.ssp")
+    assert mentions(caught.value, "system.ssp", "NULL")
+    assert not (tmp_path / "system.ssp").exists()
+
+
+def test_an_input_that_an_archive_leaves_alone_keeps_its_start_value(feedback, fmus, tmp_path):
+    root = described(feedback)
+    for connection in root.findall(".//{*}Connection"):
+        if connection.get("endConnector") == "yaw_moment":
+            connection.getparent().remove(connection)
+    plan = make_plan(load_scenario(redescribed(feedback, tmp_path / "open.ssp", root)), fmus=fmus)
+    assert unit_of(plan, "plant").constants["yaw_moment"] == 0.0
+
+
+def test_start_and_end_of_a_connection_say_nothing_of_its_direction(feedback, fmus, tmp_path):
+    root = described(feedback)
+    for one in root.findall(".//{*}Connection"):
+        for what in ("Element", "Connector"):
+            start, end = one.get(f"start{what}"), one.get(f"end{what}")
+            one.set(f"start{what}", end)
+            one.set(f"end{what}", start)
+    turned = make_plan(load_scenario(redescribed(feedback, tmp_path / "turned.ssp", root)), fmus=fmus)
+    assert turned.wires == make_plan(load_scenario(feedback), fmus=fmus).wires
+
+
+def nested(feedback, element):
+    """Return a description with one component in a system of its own, behind connectors of it."""
+    root = described(feedback)
+    component = root.find(f".//{{*}}Component[@name='{element}']")
+    inner = etree.Element(f"{{{SSD}}}System", name="inner")
+    component.getparent().replace(component, inner)
+    inner.append(deepcopy(component.find("{*}Connectors")))
+    etree.SubElement(inner, f"{{{SSD}}}Elements").append(component)
+    connections = etree.SubElement(inner, f"{{{SSD}}}Connections")
+    for connector in component.iterfind("{*}Connectors/{*}Connector"):
+        name = connector.get("name")
+        ends = {"startConnector": name, "endElement": element, "endConnector": name}
+        etree.SubElement(connections, f"{{{SSD}}}Connection", ends)
+    for connection in root.iterfind("{*}System/{*}Connections/{*}Connection"):
+        for end in ("startElement", "endElement"):
+            if connection.get(end) == element:
+                connection.set(end, "inner")
+    return root
+
+
+@pytest.mark.parametrize("element", ["controller", "tyre"])
+def test_a_system_in_the_system_is_laid_flat(element, feedback, fmus, tmp_path):
+    root = nested(feedback, element)
+    etree.XMLSchema(file=str(SCHEMAS / "SystemStructureDescription.xsd")).assertValid(root)
+    path = redescribed(feedback, tmp_path / "nested.ssp", root)
+    plan = make_plan(load_scenario(path), fmus=fmus)
+    assert any(f"inner_{element} (inner.{element})" in note for note in texts_of(plan))
+    inside = results_of(plan, tmp_path / "inside").replace(b"inner_", b"")
+    assert inside == results_of(make_plan(load_scenario(feedback), fmus=fmus), tmp_path / "outside")
+
+
+def test_a_value_at_a_systems_connector_reaches_the_inputs_behind_it(feedback, fmus, tmp_path):
+    root = nested(feedback, "tyre")
+    inner = root.find(".//{*}System[@name='inner']")
+    connections = inner.find("{*}Connections")
+    for i, name in enumerate(("friction_fl", "friction_fr")):
+        connector = etree.Element(f"{{{SSD}}}Connector", name=f"road_{i}", kind="input")
+        inner.find("{*}Connectors").append(connector)
+        ends = {"startConnector": f"road_{i}", "endElement": "tyre", "endConnector": name}
+        etree.SubElement(connections, f"{{{SSD}}}Connection", ends)
+    values = bound(f"<ssd:ParameterValues>{parameter_set('inner.road_0', 0.25, '1')}</ssd:ParameterValues>")
+    top = root.find("{*}System")
+    top.insert(0, etree.fromstring(f'<a xmlns:ssd="{SSD}">{values}</a>')[0])
+    path = redescribed(feedback, tmp_path / "road.ssp", root)
+    constants = unit_of(make_plan(load_scenario(path), fmus=fmus), "inner_tyre").constants
+    assert [constants[f"friction_{wheel}"] for wheel in ("fl", "fr", "rl", "rr")] == [0.25, 0.5, 0.5, 0.5]
+
+
+def test_names_that_cannot_name_a_unit_are_changed(feedback, fmus, tmp_path):
+    path = rewritten(
+        feedback, tmp_path / "named.ssp", ('name="plant"', 'name="vehicle"'), ('t="plant"', 't="vehicle"'),
+        ('name="tyre"', 'name="Four tyres.v2"'), ('t="tyre"', 't="Four tyres.v2"'),
+    )  # fmt: skip
+    root = described(path)
+    own = root.find(".//{urn:yawbench:ssp:1}Scenario")
+    for record in list(own):
+        own.remove(record)
+    path = redescribed(path, tmp_path / "recorded.ssp", root)
+    plan = make_plan(load_scenario(path), fmus=fmus)
+    assert {unit.name for unit in plan.instances} == {
+        "driver",
+        "reference",
+        "controller",
+        "_vehicle",
+        "Four_tyres_v2",
+    }
+    assert any(
+        "_vehicle (vehicle), Four_tyres_v2" in n or "_vehicle (vehicle) and" in n for n in texts_of(plan)
+    )
+
+
+@pytest.mark.parametrize("unit", ["km/h", "[km/h]"])
+def test_a_parameter_in_another_unit_is_converted(feedback, fmus, tmp_path, unit):
+    before = '<ssv:Real value="25.0" unit="m/s"/>'
+    path = rewritten(feedback, tmp_path / "kmh.ssp", (before, f'<ssv:Real value="90" unit="{unit}"/>'))
+    assert unit_of(make_plan(load_scenario(path), fmus=fmus), "plant").parameters["initial_speed"] == 25.0
+
+
+SPEED_MAPPED = (
+    f'<ssm:ParameterMapping xmlns:ssm="{SSM}" version="1.0">'
+    '<ssm:MappingEntry source="car.speed" target="plant.initial_speed">{}</ssm:MappingEntry>'
+    "</ssm:ParameterMapping>"
+)
+
+
+@pytest.mark.parametrize(
+    ("transformation", "speed"),
+    [("", 20.0), (f'<ssc:LinearTransformation xmlns:ssc="{SSC}" factor="1.5" offset="-4"/>', 26.0)],
+)
+def test_values_of_a_file_reach_what_they_are_mapped_to_and_go_before_those_of_components(
+    transformation, speed, feedback, fmus, tmp_path
+):
+    binding = bound('<ssd:ParameterMapping source="names.ssm"/>', source="values.ssv", prefix="car.")
+    path = rewritten(
+        feedback,
+        tmp_path / "mapped.ssp",
+        ('<ssd:System name="system">', f'<ssd:System name="system">{binding}'),
+    )
+    with zipfile.ZipFile(path, "a") as archive:
+        archive.writestr("values.ssv", parameter_set("speed", 72, "km/h"))
+        archive.writestr("names.ssm", SPEED_MAPPED.format(transformation))
+    plan = make_plan(load_scenario(path, changes=changed(settings=["plant.mass=1500"])), fmus=fmus)
+    assert unit_of(plan, "plant").parameters["initial_speed"] == speed
+    assert unit_of(plan, "plant").parameters["mass"] == 1500.0
+
+
+def test_a_mapping_may_forbid_to_convert_units(feedback, fmus, tmp_path):
+    entry = SPEED_MAPPED.format("").replace("target=", 'suppressUnitConversion="true" target=')
+    inner = (
+        f"<ssd:ParameterValues>{parameter_set('car.speed', 30, 'km/h')}</ssd:ParameterValues>"
+        f"<ssd:ParameterMapping>{entry}</ssd:ParameterMapping>"
+    )
+    path = rewritten(
+        feedback,
+        tmp_path / "as_is.ssp",
+        ('<ssd:System name="system">', f'<ssd:System name="system">{bound(inner)}'),
+    )
+    assert unit_of(make_plan(load_scenario(path), fmus=fmus), "plant").parameters["initial_speed"] == 30.0
+
+
+def test_a_value_for_what_nothing_has_is_passed_over_with_a_note(feedback, fmus, tmp_path):
+    path = rewritten(feedback, tmp_path / "typo.ssp", ('name="initial_speed"', 'name="speed"'))
+    plan = make_plan(load_scenario(path), fmus=fmus)
+    assert "initial_speed" not in unit_of(plan, "plant").parameters
+    assert mentions(texts_of(plan), "plant.speed", "values")
+
+
+def test_a_start_value_of_a_connected_input_counts_for_nothing(feedback, fmus, tmp_path):
+    path = rewritten(feedback, tmp_path / "start.ssp", ('name="initial_speed"', 'name="steer_angle"'))
+    plan = make_plan(load_scenario(path), fmus=fmus)
+    assert "steer_angle" not in unit_of(plan, "plant").constants | unit_of(plan, "plant").parameters
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "names"),
+    [
+        ("resources/plant_two_dof.fmu", "../plant_two_dof.fmu", ("archive",)),
+        ("resources/plant_two_dof.fmu", "http://host/plant.fmu", ("archive",)),
+        ("resources/plant_two_dof.fmu", "resources/nothing.fmu", ("resources/nothing.fmu",)),
+        ("resources/plant_two_dof.fmu", "plant.ssd", ("supported",)),
+        ('implementation="CoSimulation"', 'implementation="ModelExchange"', ("CoSimulation", "supported")),
+        ("<ssd:Elements>", '<ssd:Elements><ssd:Other name="x"/>', ("Other", "element", "kind")),
+        ('name="tyre"', 'name="plant"', ("'plant'", "elements")),
+        (
+            'startConnector="steer_angle" endElement="plant"',
+            'startConnector="steer" endElement="plant"',
+            ("'steer'", "driver"),
+        ),
+        (
+            'startConnector="steer_angle" endElement="plant" endConnector="steer_angle"',
+            'startConnector="velocity_x" endElement="plant" endConnector="steer_angle"',
+            ("driver.velocity_x", "plant.steer_angle"),
+        ),
+        (
+            'endElement="plant" endConnector="tyre_force_x_fr"',
+            'endElement="plant" endConnector="tyre_force_x_fl"',
+            ("plant.tyre_force_x_fl", "tyre.tyre_force_x_fl", "tyre.tyre_force_x_fr"),
+        ),
+        (
+            "<ssd:Elements>",
+            '<ssd:Elements><ssd:SignalDictionaryReference name="bus" dictionary="d"/>',
+            ("signal", "dictionary", "bus"),
+        ),
+        ('startElement="driver"', 'startElement="nobody"', ("'nobody'", "component")),
+        ('startElement="driver"', "", ("'steer_angle'", "connector", "system")),
+        (
+            'source="resources/plant_two_dof.fmu"',
+            'source="a.fmu" sourceBase="component"',
+            ("component",),
+        ),
+        ('startTime="0.0"', 'startTime="1.0"', ("start_time", "1 s")),
+        ('value="25.0"', 'value="fast"', ("'fast'", "Real")),
+        ("</ssd:System>", "", ("not well-formed",)),
+    ],
+)
+def test_what_an_archive_cannot_mean_here_is_said_in_one_sentence(
+    feedback, fmus, tmp_path, before, after, names
+):
+    archive = rewritten(feedback, tmp_path / "changed.ssp", (before, after))
+    sentence = problem(archive, fmus)
+    assert sentence.startswith(str(archive))
+    assert mentions(sentence, *names)
+
+
+def test_an_archive_without_a_step_asks_for_one_and_takes_it(feedback, fmus, tmp_path):
+    path = rewritten(
+        feedback,
+        tmp_path / "no_step.ssp",
+        ("osp:FixedStepAlgorithm", "osp:Other"),
+        ("oms:FixedStepMaster", "oms:Other"),
+        ("yawbench:Scenario", "ssc:Other"),
+    )
+    asks = f"{path}: the archive says no communication step: give one in s, such as --set step_size=0.001"
+    assert problem(path, fmus) == asks
+    plan = make_plan(load_scenario(path, changes=changed(step_size=0.0025)), fmus=fmus)
+    assert (plan.n_steps, plan.algorithm) == (240, "extrapolated")
+
+
+def test_the_step_of_an_archive_of_omsimulator_is_taken(feedback, fmus, tmp_path):
+    path = rewritten(
+        feedback,
+        tmp_path / "oms.ssp",
+        ("<osp:FixedStepAlgorithm", "<osp:Other"),
+        ('oms-ma" stepSize="0.001"', 'oms-ma" stepSize="0.000500"'),
+        ("yawbench:Scenario", "ssc:Other"),
+    )
+    assert make_plan(load_scenario(path), fmus=fmus).step == Fraction(1, 2000)
+
+
+def test_an_archive_without_a_stop_time_asks_for_one(feedback, fmus, tmp_path):
+    path = rewritten(feedback, tmp_path / "endless.ssp", ('stopTime="0.6"', ""))
+    assert mentions(problem(path, fmus), "archive", "stop", "time")
+    assert make_plan(load_scenario(path, changes=changed(stop_time=0.2)), fmus=fmus).n_steps == 200
+
+
+@pytest.mark.parametrize(
+    ("xml", "says"),
+    [
+        ('<fmiModelDescription fmiVersion="1.0"/>', "FMI 1.0"),
+        ('<fmiModelDescription fmiVersion="3.0"><CoSimulation/></fmiModelDescription>', "FMI 3.0"),
+        ("<fmiModel", "modelDescription.xml"),
+    ],
+)
+def test_a_component_that_cannot_be_run_is_named(xml, says, feedback, fmus, tmp_path):
+    member = "resources/plant_two_dof.fmu"
+    content = make_fmu(tmp_path / "plant.fmu", xml=xml).read_bytes()
+    path = redescribed(feedback, tmp_path / "other.ssp", described(feedback), {member: content})
+    sentence = problem(path, fmus)
+    assert member in sentence
+    assert says in sentence
+
+
+def test_entities_are_not_expanded_and_no_file_is_read_for_them(feedback, fmus, tmp_path):
+    secret = tmp_path / "secret"
+    secret.write_text("90")
+    declared = f'<!DOCTYPE a [<!ENTITY e SYSTEM "{secret.as_uri()}">]><ssd:SystemStructureDescription '
+    path = rewritten(
+        feedback,
+        tmp_path / "entity.ssp",
+        ("<ssd:SystemStructureDescription ", declared),
+        ('<ssv:Real value="25.0" unit="m/s"/>', "&e;"),
+    )
+    assert mentions(problem(path, fmus), "has no value")
+
+
+@pytest.mark.parametrize("content", [b"", b"no zip", b"PK\x03\x04 cut off"])
+def test_what_is_no_archive_is_said_in_one_sentence(tmp_path, fmus, content):
+    archive = tmp_path / "broken.ssp"
+    archive.write_bytes(content)
+    assert problem(archive, fmus).startswith(f"{archive}: ")
+    assert mentions(problem(tmp_path / "missing.ssp", fmus), "missing.ssp", "archive")
+
+
+def test_an_archive_that_lacks_its_description_is_refused(feedback, fmus, tmp_path):
+    archive = rewritten(feedback, tmp_path / "empty.ssp", without=(DESCRIPTION_FILE,))
+    assert mentions(problem(archive, fmus), "SystemStructure.ssd")

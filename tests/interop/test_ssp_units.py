@@ -1,0 +1,260 @@
+"""Conversions by the connections of an SSP archive: units of connectors, transformations, systems."""
+
+from __future__ import annotations
+
+import math
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from tests.changed import changed
+from tests.fmus.fake_fmus import Var, make_fmu, out
+from tests.refusals import each_mentions, mentions, refused, texts_of
+from yawbench.foundation.errors import YawbenchError
+from yawbench.interop.ssp_write import for_omsimulator, system_structure, write_ssp
+from yawbench.orchestrator.plan import Plan, Wire
+from yawbench.orchestrator.scenario.loader import load_scenario
+from yawbench.orchestrator.scenario.ssp_archive import SSC, SSD, SSV
+from yawbench.orchestrator.wiring.make_plan import make_plan
+
+pytestmark = pytest.mark.usefixtures("common_cache")
+
+UNITS = """<ssd:Units>
+  <ssc:Unit name="deg"><ssc:BaseUnit rad="1" factor="0.0174532925199433"/></ssc:Unit>
+  <ssc:Unit name="turn"><ssc:BaseUnit rad="1" factor="6.283185307179586"/></ssc:Unit>
+  <ssc:Unit name="rad"><ssc:BaseUnit rad="1"/></ssc:Unit>
+  <ssc:Unit name="m"><ssc:BaseUnit m="1"/></ssc:Unit>
+</ssd:Units>"""
+
+
+def connector(name: str, kind: str, unit: str | None = None, of: str = "Real") -> str:
+    measure = f' unit="{unit}"' if unit else ""
+    return f'<ssd:Connector name="{name}" kind="{kind}"><ssc:{of}{measure}/></ssd:Connector>'
+
+
+def component(name: str, *connectors: str, more: str = "") -> str:
+    return (
+        f'<ssd:Component name="{name}" source="resources/{name}.fmu">'
+        f"<ssd:Connectors>{''.join(connectors)}</ssd:Connectors>{more}</ssd:Component>"
+    )
+
+
+def wire(start: str, end: str, inner: str = "", **attributes: str) -> str:
+    ends = zip(("start", "end"), (start, end), strict=True)
+    named = [
+        f'{which}Element="{e}" {which}Connector="{c}"'
+        for which, one in ends
+        for e, _, c in [one.partition(".")]
+    ]
+    more = " ".join(f'{key}="{value}"' for key, value in attributes.items())
+    return f"<ssd:Connection {' '.join(named)} {more}>{inner}</ssd:Connection>"
+
+
+def archive(
+    folder: Path, elements: str, connections: str, *, connectors: str = "", bindings: str = ""
+) -> Path:
+    """Write an archive of the FMUs a, which gives y, and b, which takes x."""
+    text = (
+        f'<ssd:SystemStructureDescription xmlns:ssd="{SSD}" xmlns:ssc="{SSC}" xmlns:ssv="{SSV}" '
+        f'version="1.0" name="s"><ssd:System name="r"><ssd:Connectors>{connectors}</ssd:Connectors>'
+        f"{bindings}<ssd:Elements>{elements}</ssd:Elements><ssd:Connections>{connections}</ssd:Connections>"
+        f'</ssd:System>{UNITS}<ssd:DefaultExperiment stopTime="1"/></ssd:SystemStructureDescription>'
+    )
+    path = folder / "s.ssp"
+    with zipfile.ZipFile(path, "w") as held:
+        held.writestr("SystemStructure.ssd", text)
+        for fmu in folder.glob("*.fmu"):
+            held.write(fmu, f"resources/{fmu.name}")
+    return path
+
+
+def fmus(folder: Path, of: str | None, to: str | None, kind: str = "Real") -> None:
+    change = {} if kind == "Real" else {"type": kind, "variability": "discrete"}
+    make_fmu(folder / "a.fmu", outputs=[out("y", unit=of, **change)], parameters=[Var("p", to)])
+    start = "false" if kind == "Boolean" else 0
+    make_fmu(folder / "b.fmu", inputs=[Var("x", to, start=start, **change)], outputs=["z"])
+
+
+def plan_of(path: Path) -> Plan:
+    return make_plan(load_scenario(path, changes=changed(step_size=0.1)))
+
+
+def scale(path: Path) -> tuple[float, float]:
+    """Return gain and offset of the only wire."""
+    (only,) = plan_of(path).wires
+    assert (only.source, only.output, only.target, only.input) == ("a", "y", "b", "x")
+    return pytest.approx(only.gain, rel=1e-12), pytest.approx(only.offset, rel=1e-12)  # type: ignore[return-value]
+
+
+def problem(path: Path) -> str:
+    with pytest.raises(YawbenchError) as caught:
+        plan_of(path)
+    (sentence,) = texts_of(caught.value)
+    return sentence
+
+
+@pytest.mark.parametrize(
+    ("of", "to", "start", "end", "gain"),
+    [
+        (None, None, "deg", "rad", math.pi / 180),  # only the archive says
+        ("deg", "rad", None, None, math.pi / 180),  # only the FMUs say
+        ("deg", "rad", "deg", "rad", math.pi / 180),
+        ("deg", "rad", "rad", "deg", math.pi / 180),  # there and back
+        ("rad", None, None, "deg", 180 / math.pi),
+        (None, "rad", "turn", None, 2 * math.pi),  # known by its definition alone
+        (None, None, "deg", None, 1.0),
+        ("rad", "rad", None, None, 1.0),
+    ],
+)
+def test_units_of_connectors_are_converted(of, to, start, end, gain, tmp_path):
+    fmus(tmp_path, of, to)
+    elements = component("a", connector("y", "output", start)) + component("b", connector("x", "input", end))
+    assert scale(archive(tmp_path, elements, wire("a.y", "b.x"))) == (gain, 0.0)
+
+
+ENDS = component("a", connector("y", "output", "deg")) + component("b", connector("x", "input", "rad"))
+LINEAR = '<ssc:LinearTransformation factor="10" offset="0.5"/>'
+
+
+@pytest.mark.parametrize(
+    ("inner", "attributes", "expected"),
+    [
+        ("<ssc:LinearTransformation/>", {}, (math.pi / 180, 0.0)),
+        (LINEAR, {}, (math.pi / 18, 0.5)),  # converted first
+        (LINEAR, {"suppressUnitConversion": "true"}, (10.0, 0.5)),
+        ("", {"suppressUnitConversion": "1"}, (1.0, 0.0)),
+    ],
+)
+def test_a_linear_transformation_comes_after_the_conversion_or_in_its_place(
+    inner, attributes, expected, tmp_path
+):
+    fmus(tmp_path, "deg", "rad")
+    assert scale(archive(tmp_path, ENDS, wire("a.y", "b.x", inner, **attributes))) == expected
+
+
+def test_units_that_do_not_fit_are_refused_unless_that_is_suppressed(tmp_path):
+    fmus(tmp_path, None, None)
+    elements = component("a", connector("y", "output", "m")) + component("b", connector("x", "input", "rad"))
+    assert mentions(problem(archive(tmp_path, elements, wire("a.y", "b.x"))), "SystemStructure.ssd:1", "b.x")
+    assert scale(archive(tmp_path, elements, wire("a.y", "b.x", suppressUnitConversion="true"))) == (1.0, 0.0)
+
+
+def test_an_empty_element_is_the_system_itself_and_its_connectors_convert_too(tmp_path):
+    fmus(tmp_path, None, None)
+    inner = (
+        '<ssd:System name="in"><ssd:Connectors>' + connector("u", "input", "deg") + "</ssd:Connectors>"
+        "<ssd:Elements>" + component("b", connector("x", "input", "rad")) + "</ssd:Elements>"
+        "<ssd:Connections>" + wire(".u", "b.x", LINEAR) + "</ssd:Connections></ssd:System>"
+    )
+    elements = component("a", connector("y", "output", "turn")) + inner
+    (only,) = plan_of(archive(tmp_path, elements, wire("a.y", "in.u"))).wires
+    assert (only.gain, only.offset) == (pytest.approx(10 * 2 * math.pi), 0.5)
+
+
+def test_a_value_at_a_systems_connector_is_converted_on_its_way(tmp_path):
+    fmus(tmp_path, None, None)
+    bindings = (
+        "<ssd:ParameterBindings><ssd:ParameterBinding><ssd:ParameterValues>"
+        '<ssv:ParameterSet version="1.0" name="v"><ssv:Parameters><ssv:Parameter name="u">'
+        '<ssv:Real value="0.25" unit="turn"/></ssv:Parameter></ssv:Parameters><ssv:Units>'
+        '<ssc:Unit name="turn"><ssc:BaseUnit rad="1" factor="6.283185307179586"/></ssc:Unit></ssv:Units>'
+        "</ssv:ParameterSet></ssd:ParameterValues></ssd:ParameterBinding></ssd:ParameterBindings>"
+    )
+    path = archive(
+        tmp_path,
+        component("b", connector("x", "input", "rad")),
+        wire(".u", "b.x", LINEAR),
+        connectors=connector("u", "input", "deg"),
+        bindings=bindings,
+    )
+    (b,) = plan_of(path).instances
+    assert b.constants == {"x": pytest.approx(10 * math.pi / 2 + 0.5)}
+
+
+@pytest.mark.parametrize(
+    ("kind", "inner", "names"),
+    [
+        ("Integer", '<ssc:LinearTransformation factor="2" offset="-1"/>', None),
+        ("Integer", LINEAR, ("gain", "offset", "Integer")),
+        ("Boolean", '<ssc:LinearTransformation factor="2"/>', ("gain", "Boolean")),
+        ("Boolean", "<ssc:BooleanMappingTransformation/>", ("BooleanMappingTransformation",)),
+        ("Integer", "<ssc:IntegerMappingTransformation/>", ("IntegerMappingTransformation",)),
+        ("Real", '<ssc:LinearTransformation factor="much"/>', ("factor", "'much'")),
+    ],
+)
+def test_what_cannot_be_done_to_a_type_is_refused_in_one_sentence(kind, inner, names, tmp_path):
+    fmus(tmp_path, None, None, kind)
+    elements = component("a", connector("y", "output", of=kind)) + component(
+        "b", connector("x", "input", of=kind)
+    )
+    path = archive(tmp_path, elements, wire("a.y", "b.x", inner))
+    if names is None:
+        assert scale(path) == (2.0, -1.0)
+    else:
+        assert mentions(problem(path), *names)
+
+
+# What is written
+
+
+def converting(folder: Path, connection: str = "{from: a.y, to: b.x}") -> Plan:
+    fmus(folder, "deg", "rad")
+    (folder / "s.yaml").write_text(
+        "title: 3 m/s, Größe\nstop_time: 1\nstep_size: 0.1\nunits: {a: {fmu: ./a.fmu}, b: {fmu: ./b.fmu}}\n"
+        f"connections: [{connection}]\n",
+        encoding="utf-8",
+    )
+    return make_plan(load_scenario(folder / "s.yaml"))
+
+
+@pytest.mark.parametrize(
+    "connection",
+    [
+        "{from: a.y, to: b.x}",
+        "{from: a.y, to: b.x, gain: 7, offset: -1}",
+        "{from: a.y, to: b.x, gain: 1}",  # of another unit: it must not be converted
+    ],
+)
+def test_a_converting_wire_is_written_in_full_and_read_back_the_same(connection, tmp_path):
+    plan = converting(tmp_path, connection)
+    write_ssp(plan, tmp_path / "s.ssp")
+    back = make_plan(load_scenario(tmp_path / "s.ssp"))
+    assert back.wires == plan.wires
+    (transformation,) = system_structure(plan).iter(f"{{{SSC}}}LinearTransformation")
+    assert transformation.getparent().get("suppressUnitConversion") == "true"
+    assert float(transformation.get("factor")) == plan.wires[0].gain
+
+
+def test_the_name_is_an_identifier_and_the_title_is_read_back(tmp_path):
+    plan = converting(tmp_path)
+    assert system_structure(plan).get("name") == "_3_m_s_Groe"
+    write_ssp(plan, tmp_path / "s.ssp")
+    assert load_scenario(tmp_path / "s.ssp").title == "3 m/s, Größe"
+
+
+def test_for_omsimulator_units_convert_and_a_gain_of_its_own_is_refused(tmp_path):
+    plan, notes = for_omsimulator(converting(tmp_path))
+    assert plan.wires == (Wire("a", "y", "b", "x"),)
+    assert notes == []
+    units = [real.get("unit") for real in system_structure(plan).iter(f"{{{SSC}}}Real")]
+    assert units[:2] == ["deg", "rad"]
+    with refused(YawbenchError, "ssp-unsupported", names=("a.y", "b.x")):
+        for_omsimulator(converting(tmp_path, "{from: a.y, to: b.x, gain: 7}"))
+
+
+def test_for_omsimulator_steps_and_texts_are_left_out_with_a_word(tmp_path):
+    make_fmu(
+        tmp_path / "c.fmu",
+        outputs=["z"],
+        parameters=[Var("mode", type="String", start="calm"), Var("kind", type="String", start="old")],
+    )
+    (tmp_path / "s.yaml").write_text(
+        "stop_time: 1\nstep_size: 0.1\n"
+        "units: {c: {fmu: ./c.fmu, step_size: 0.2, parameters: {mode: wild, kind: old}}}\n"
+    )
+    plan, notes = for_omsimulator(make_plan(load_scenario(tmp_path / "s.yaml")))
+    assert each_mentions(notes, ("OMSimulator", "step", "instances"), ("c.mode", "'wild'"))
+    component = next(system_structure(plan).iter(f"{{{SSD}}}Component"))
+    assert component.find(f"{{{SSD}}}Annotations") is None
+    assert not list(component.iter(f"{{{SSV}}}String"))

@@ -1,0 +1,207 @@
+"""Fits of scenarios: the truth is found again, mistakes have a line, what cannot be identified is refused."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import yawbench as yb
+from tests.commands.test_output import ALWAYS, documented
+from tests.reports.made_up import unpacked
+from yawbench.cli import main
+from yawbench.foundation.errors import ScenarioError
+from yawbench.measured_cars.fit import load_fit
+from yawbench.orchestrator.scenario import yaml_lines
+
+TRUTH = {"yaw_inertia": 1791.6, "front": 0.72, "rear": 1.0}
+SCENARIO = """title: 7 DOF
+vehicle: {vehicle}
+stop_time: {stop}
+step_size: 0.004
+speed: 25
+friction: 0.9
+units:
+  plant: {{fmu: plant_seven_dof}}
+  tyre: {{fmu: tyre_magic_formula}}
+inputs:
+  steer_angle: {{file: {file}}}
+  wheel_torque_*: 0
+"""
+MEASURED = """files: [run.csv]
+time: {unit: s}
+signals:
+  steer_angle: {column: steer_angle, unit: rad}
+  velocity_x: {column: velocity_x, unit: m/s}
+  sideslip: {column: sideslip, unit: rad}
+  yaw_rate: {column: yaw_rate, unit: rad/s}
+  acceleration_y: {column: acceleration_y, unit: m/s2}
+car: made up
+source: a run
+licence: none
+date: 2024-01-01
+"""
+FIT = """title: A car fitted to itself
+scenario: scenario.yaml
+measured: measured.yaml
+training: [{begin: 0, end: 3 s}]
+held_out: [{begin: 3 s, end: 4 s}]
+compared: {yaw_rate: 0.1 deg/s, acceleration_y: 0.05 m/s2}
+settling: 0.2 s
+free:
+  vehicle.yaw_inertia: {low: 800, high: 4000, start: 2200}
+  vehicle.cornering_stiffness_scale_front: {low: 0.3, high: 2, start: 0.85}
+  vehicle.cornering_stiffness_scale_rear: {low: 0.3, high: 2, start: 0.8}
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A scenario, the recording of a run of it, and a fit file."""
+    place = tmp_path_factory.mktemp("fit")
+    vehicle = Path(__file__).parents[2] / "scenarios" / "vehicles" / "mid_size.yaml"
+    times = np.arange(0.0, 4.005, 0.01)
+    steer = 0.03 * np.sin(2.0 * np.pi * 0.7 * np.maximum(times - 0.3, 0.0))
+    table = np.column_stack([times, steer])
+    np.savetxt(place / "steer.csv", table, delimiter=",", header="time,steer_angle [rad]", comments="")
+    (place / "truth.yaml").write_text(SCENARIO.format(vehicle=vehicle, stop=4, file="steer.csv"))
+    run = yb.load(place / "truth.yaml").run()
+    names = ("velocity_x", "sideslip", "yaw_rate", "acceleration_y")
+    columns = [times, steer, *(np.interp(times, run.time, run[f"plant.{name}"]) for name in names)]
+    header = ",".join(["time", "steer_angle", *names])
+    np.savetxt(place / "run.csv", np.column_stack(columns), delimiter=",", header=header, comments="")
+    (place / "measured.yaml").write_text(MEASURED)
+    (place / "scenario.yaml").write_text(SCENARIO.format(vehicle=vehicle, stop=4, file="measured.yaml"))
+    (place / "fit.yaml").write_text(FIT)
+    return place
+
+
+def run(*arguments: object) -> int:
+    """Return the exit status of the command line."""
+    with pytest.raises(SystemExit) as ended:
+        main([str(one) for one in arguments])
+    return int(ended.value.code or 0)
+
+
+def test_a_car_is_found_again_and_the_single_track_stands_beside(folder, capsys):
+    assert run("fit", folder / "fit.yaml", "--out", folder / "out", "--jobs", "1", "--json") == 0
+    data = json.loads((folder / "out" / "fit.json").read_text())
+    answer = json.loads(capsys.readouterr().out)
+    assert set(answer) == ALWAYS | documented()["fit"]
+    assert answer["fit"] == data
+    own, single = data["models"].values()
+    for name, truth in zip(own["parameters"], TRUTH.values(), strict=True):
+        assert own["parameters"][name]["value"] == pytest.approx(truth, rel=1e-4)
+        assert own["parameters"][name]["interval"] is None  # of one piece
+    assert own["sets"] <= 60
+    for name in ("yaw_rate", "acceleration_y"):
+        assert own["scores"]["held_out"][name]["rms"] < 0.1 * single["scores"]["held_out"][name]["rms"]
+        assert own["scores"]["held_out"][name]["fit"] > 99.9
+    assert data["verdict"].startswith("better than")
+    assert "held-out" in answer["tables"][-1]["columns"][-1]["heading"]
+    assert not (folder / "out" / "sets").exists()
+    page = unpacked(folder / "out" / "fit.html")
+    for words in ("better than a single track", "Rms differences over |acceleration_y|", "over lateral"):
+        assert words in page.replace("Better", "better")
+    text = (folder / "out" / "vehicle.yaml").read_text()
+    assert "fitted to made up" in text
+    vehicle = yaml_lines.read(folder / "out" / "vehicle.yaml", what="vehicle file").data
+    assert vehicle["parameters"]["yaw_inertia"] == pytest.approx(1791.6, rel=1e-4)
+
+
+def test_an_interrupted_fit_goes_on(folder, monkeypatch):
+    from yawbench.measured_cars import fit as module
+
+    made = []
+    original = module.execute
+
+    def stops(jobs, **options):
+        made.append(len(jobs))
+        if len(made) == 4:
+            raise KeyboardInterrupt
+        return original(jobs, **options)
+
+    monkeypatch.setattr(module, "execute", stops)
+    command = ("fit", folder / "fit.yaml", "--out", folder / "again", "--jobs", "1")
+    assert run(*command) == 130
+    before = sum(made[:3])
+    assert len(list((folder / "again" / "sets").iterdir())) == before
+    made.clear()
+    made.extend([0] * 4)  # no further interruption
+    assert run(*command) == 0
+    total = json.loads((folder / "again" / "fit.json").read_text())["models"]["7 DOF"]["sets"]
+    assert sum(made) == total - before + 1  # one of the held-out window
+
+
+def test_a_parameter_without_effect_is_refused(folder):
+    without = "  plant.low_speed: {low: 0.1, high: 2, start: 1}\n"
+    (folder / "without.yaml").write_text(FIT.replace("free:\n", f"free:\n{without}"))
+    with pytest.raises(ScenarioError) as refused:
+        yb.fit(folder / "without.yaml", workers=1)
+    assert refused.value.code == "fit-not-identifiable"
+    assert "plant.low_speed" in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "code", "line"),
+    [
+        ("compared: {yaw_rate:", "compared: {roll_rate:", "signal-unknown", 6),
+        ("begin: 3 s", "begin: 2 s", "fit-window", 5),
+        ("end: 4 s", "end: 9 s", "fit-window", 5),
+        ("{begin: 0,", "{segment: 2, begin: 0,", "segment-unknown", 4),
+        ("title: A", "titel: A", "key-unknown", 1),
+    ],
+)
+def test_mistakes_of_a_fit_file_have_a_line(folder, old, new, code, line):
+    path = folder / "wrong.yaml"
+    path.write_text(FIT.replace(old, new))
+    with pytest.raises(ScenarioError) as refused:
+        load_fit(path)
+    assert (code, line) in {(one.code, one.location.line) for one in refused.value.diagnostics}
+
+
+@pytest.mark.parametrize(
+    ("free", "most_sets"),
+    [
+        ("vehicle.yaw_inertia: {low: 800, high: 1000, start: 900}", 60),  # the truth lies beyond
+        ("vehicle.yaw_inertia: {low: 800, high: 4000, start: 3999.999}", 2),  # no set but the first
+        ("vehicle.yaw_inertia: {low: 800, high: 4000, start: 2200}", 2),
+    ],
+)
+def test_a_fit_of_one_parameter_that_ends_where_it_began_or_at_a_bound_has_a_result(
+    free, most_sets, folder, tmp_path, capsys
+):
+    head = FIT.partition("free:")[0]
+    file = folder / "one.yaml"
+    file.write_text(f"{head}most_sets: {most_sets}\nfree:\n  {free}\n")
+    assert run("fit", file, "--out", tmp_path / "out", "--jobs", "1") == 0, capsys.readouterr().err
+    data = json.loads((tmp_path / "out" / "fit.json").read_text())
+    own, _ = data["models"].values()
+    (parameter,) = own["parameters"].values()
+    assert 800 <= parameter["value"] <= 4000
+    assert (tmp_path / "out" / "fit.html").is_file()
+
+
+@pytest.mark.parametrize("settling", ["3 s", "2.9999 s", "1000 s"])
+def test_a_window_of_which_nothing_is_compared_is_refused_at_its_line(settling, folder, tmp_path):
+    file = folder / "settling.yaml"
+    file.write_text(FIT.replace("settling: 0.2 s", f"settling: {settling}"))
+    with pytest.raises(ScenarioError) as caught:
+        load_fit(file)
+    assert {one.code for one in caught.value.diagnostics} == {"fit-window"}
+    lines = file.read_text().splitlines()
+    assert all(
+        lines[one.location.line - 1].startswith(("training", "held_out")) for one in caught.value.diagnostics
+    )
+    assert "settling" in str(caught.value)
+
+
+def test_values_too_large_to_be_compared_are_refused(folder):
+    file = folder / "large.yaml"
+    file.write_text(FIT.replace("yaw_rate: 0.1 deg/s", "yaw_rate: 1e-290"))
+    with pytest.raises(ScenarioError) as caught:
+        load_fit(file)
+    assert {one.code for one in caught.value.diagnostics} == {"fit-window"}
+    assert "yaw_rate" in str(caught.value)

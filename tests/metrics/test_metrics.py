@@ -1,0 +1,588 @@
+"""Measures against closed forms; how metrics find their signals."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.orchestrator.recorded import car, noted, results
+from tests.refusals import mentions, refused
+from yawbench.figures.display import digits_of, shown, shown_unit
+from yawbench.figures.plots import LabelledRun, draw, shown_by
+from yawbench.foundation.errors import ScenarioError
+from yawbench.metrics import measures
+from yawbench.metrics.expressions import (
+    AT_A_TIME,
+    MetricValue,
+    evaluate,
+    evaluate_all,
+    metric,
+    while_moving,
+    why_none,
+)
+from yawbench.metrics.measures import catalogue
+from yawbench.metrics.verdict import compare
+from yawbench.orchestrator.results.reader import Results
+from yawbench.orchestrator.results.run_record import ConnectionRecord, FmuRecord, RunRecord
+from yawbench.proving_ground.standard_tests import Evaluation
+from yawbench.reports.divergence import divergence, partings_table
+from yawbench.studies.driven_tests import run_table
+from yawbench.studies.listings import metrics_of_run
+from yawbench.vocabulary.wheels import WHEELS
+
+T = np.linspace(0.0, 2.0, 20001)
+SINE = np.sin(2 * np.pi * T)
+
+
+def test_errors_of_a_sine_around_zero_are_those_of_the_sine():
+    zero = np.zeros_like(T)
+    assert measures.mean_error(T, SINE, zero) == pytest.approx(2 / math.pi, rel=1e-7)
+    assert measures.rms_error(T, SINE, zero) == pytest.approx(1 / math.sqrt(2), rel=1e-9)
+    assert measures.peak_error(T, SINE, zero) == pytest.approx(1.0, rel=1e-9)
+
+
+def test_relative_errors_are_relative_to_the_peak_of_the_reference():
+    reference = -2 * SINE
+    assert measures.relative_peak_error(T, 1.5 * reference, reference) == pytest.approx(0.5)
+    assert measures.relative_rms_error(T, 1.5 * reference, reference) == pytest.approx(0.5 / math.sqrt(2))
+    assert measures.relative_mean_error(T, 1.5 * reference, reference) == pytest.approx(1 / math.pi, rel=1e-6)
+
+
+def test_effort_is_the_integral_of_the_absolute_value():
+    assert measures.effort(T, 3 * SINE) == pytest.approx(3 * 4 / math.pi, rel=1e-7)
+
+
+def test_integrals_hold_for_uneven_samples():
+    t = np.concatenate([np.linspace(0, 1, 11), np.linspace(1, 3, 5001)[1:]])
+    assert measures.integral(t, 2 * t) == pytest.approx(9.0, rel=1e-12)
+
+
+def test_total_variation_of_a_sine_is_four_amplitudes_per_period():
+    assert measures.total_variation(T, 5 * SINE) == pytest.approx(2 * 4 * 5, rel=1e-6)
+    assert measures.total_variation_rate(T, 5 * SINE) == pytest.approx(4 * 5, rel=1e-6)
+
+
+def test_slope_variation_of_a_sine_is_that_of_its_derivative():
+    assert measures.slope_variation_rate(T, SINE) == pytest.approx(4 * 2 * math.pi, rel=1e-3)
+
+
+def test_settling_time_of_a_first_order_lag_is_three_time_constants():
+    settles = measures.settling_time(T, 1 - np.exp(-T / 0.4), np.ones_like(T))
+    assert settles == pytest.approx(0.4 * math.log(20), abs=2e-4)
+
+
+def test_a_signal_that_ends_outside_the_band_never_settles():
+    assert measures.settling_time(T, 1 - np.exp(-T / 4), np.ones_like(T)) == math.inf
+
+
+def test_a_signal_that_never_leaves_the_band_has_settled_at_once():
+    assert measures.settling_time(T, SINE * 1.04, SINE) == 0.0
+
+
+def test_overshoot_of_a_second_order_system_follows_from_its_damping():
+    zeta = 0.3
+    omega = 10.0
+    damped = omega * math.sqrt(1 - zeta**2)
+    step = 1 - np.exp(-zeta * omega * T) * (
+        np.cos(damped * T) + zeta / math.sqrt(1 - zeta**2) * np.sin(damped * T)
+    )
+    expected = math.exp(-math.pi * zeta / math.sqrt(1 - zeta**2))
+    assert measures.overshoot(T, step, np.ones_like(T)) == pytest.approx(expected, rel=1e-4)
+    assert measures.overshoot(T, 0.7 * SINE, SINE) == 0.0
+
+
+def test_the_first_change_is_found_and_none_where_there_is_none():
+    x = np.where(T < 1.2, 3.0, 5.0)
+    assert measures.changes(T, x) == 1.0
+    assert measures.change_time(T, x) == pytest.approx(T[T >= 1.2][0] - T[0])
+    assert measures.changes(T, np.ones_like(T)) == 0.0
+    assert math.isnan(measures.change_time(T, np.ones_like(T)))
+
+
+def test_displacement_counts_from_the_first_value_peak_from_zero():
+    assert measures.displacement(T, 10 - T) == pytest.approx(2.0)
+    assert measures.peak(T, 10 - T) == pytest.approx(10.0)
+    assert measures.final(T, 10 - T) == pytest.approx(8.0)
+
+
+def test_rms_of_a_sine_is_its_amplitude_over_root_two():
+    assert measures.rms(T, 3 * SINE) == pytest.approx(3 / math.sqrt(2), rel=1e-9)
+
+
+def test_the_worst_second_is_the_largest_rms_over_a_second():
+    t = np.linspace(0.0, 4.0, 401)
+    pulse = np.where((t >= 2.0) & (t <= 2.5), 3.0, 0.0)
+    assert measures.worst_second(t, pulse) == pytest.approx(3.0 * math.sqrt(0.5), rel=0.02)
+    assert measures.worst_second(t, 2.0 + 0.0 * t) == pytest.approx(2.0)
+    assert math.isnan(measures.worst_second(t[:50], pulse[:50]))
+
+
+def test_phase_area_of_a_sine_is_that_of_its_ellipse_once_per_period():
+    rate = 2 * math.pi * np.cos(2 * np.pi * T)
+    assert measures.phase_area(T, 0.3 * SINE, 0.3 * rate) == pytest.approx(
+        2 * math.pi * 0.3 * 0.3 * 2 * math.pi, rel=1e-9
+    )
+
+
+def test_the_stability_index_is_one_on_the_edge_of_the_strip():
+    ones = np.ones_like(T)
+    edge = math.radians(24)
+    assert measures.stability_index(T, edge / 4 * ones, 0 * ones) == pytest.approx(1.0)
+    assert measures.stability_index(T, 0 * ones, -edge * ones) == pytest.approx(1.0)
+    assert measures.stability_index(T, edge / 4 * ones, -edge * ones) == pytest.approx(0.0)
+
+
+def test_time_beyond_is_the_share_of_time_outside_the_strip():
+    beyond = np.where((T >= 0.5) & (T < 0.9), 1.0, 0.0)
+    assert measures.time_beyond(T, beyond, 0 * T) == pytest.approx(0.2, rel=1e-9)
+    assert measures.time_beyond(T, 0 * T, 0 * T) == 0.0
+
+
+def test_jerk_is_the_slope_of_a_ramp_and_knows_nothing_of_a_controllers_samples():
+    assert measures.jerk(T, 3 * T) == pytest.approx(3.0)
+    assert measures.jerk(T, 3 * T + 0.01 * (np.arange(T.size) % 2)) == pytest.approx(3.0, rel=0.01)
+    assert math.isnan(measures.jerk(T[:3], T[:3]))
+
+
+def test_grip_use_is_the_tyres_force_over_its_load_and_the_worst_wheel_counts():
+    loads = {f"plant.vertical_load_{w}": 1000 + 0 * T for w in WHEELS}
+    forces = {f"tyre.tyre_force_x_{w}": 300 + 0 * T for w in WHEELS} | {
+        f"tyre.tyre_force_y_{w}": (400 if w == "rl" else 0) + 0 * T for w in WHEELS
+    }
+    found = evaluate(results(loads | forces, T), metric("grip_use(tyre_force_x_*)"))
+    assert (found.number, found.unit) == (pytest.approx(0.5), "1")
+    assert evaluate(results(forces, T), metric("grip_use(tyre_force_x_*)")) is None
+    assert evaluate(results(loads | forces, T), metric("grip_use(tyre_force_y_*)")) is None
+    in_the_air = {"plant.vertical_load_fl": 0 * T, "tyre.tyre_force_x_fl": 0 * T}
+    lifted = evaluate(results(loads | forces | in_the_air, T), metric("grip_use(tyre_force_x_*)"))
+    assert lifted is not None
+    assert lifted.number == pytest.approx(0.5)
+
+
+def test_the_path_is_compared_with_that_of_a_car_that_follows_its_reference():
+    quarter = np.pi / 2 / T[-1]  # of a circle to the left, of radius 1 m, begun northwards
+    columns = {
+        "plant.yaw_angle": np.pi / 2 + quarter * T, "plant.velocity_x": quarter + 0 * T,
+        "reference.yaw_rate_ref": quarter + 0 * T, "reference.sideslip_ref": 0 * T,
+        "plant.position_y": 5 + np.sin(quarter * T),
+    }  # fmt: skip
+    error = metric("relative_path_error(position_y)")
+    assert evaluate(results(columns, T), error).number == pytest.approx(0.0, abs=1e-7)
+    assert evaluate(results(columns, T), error, (0.5, 1.5)).number == pytest.approx(0.0, abs=1e-7)
+    columns["plant.position_y"] = 5 + 1.1 * np.sin(quarter * T)
+    assert evaluate(results(columns, T), error).number == pytest.approx(0.1 / math.sqrt(2), rel=1e-6)
+    columns["reference.sideslip_ref"] += np.pi / 2  # it drives to the west
+    columns["plant.position_y"] = 5 - 1 + np.cos(quarter * T)
+    assert evaluate(results(columns, T), error).number == pytest.approx(0.0, abs=1e-7)
+
+
+def test_a_recorded_rate_goes_before_the_difference_quotient():
+    sideslip = 0.05 * SINE
+    index = metric("stability_index(sideslip)")
+    rate = 0.1 * np.pi * np.cos(2 * np.pi * T)
+    by_quotient = evaluate(results({"plant.sideslip": sideslip}, T), index)
+    columns = {"plant.sideslip": sideslip, "plant.sideslip_rate": rate}
+    assert by_quotient.number == pytest.approx(evaluate(results(columns, T), index).number, rel=1e-5)
+    columns["plant.sideslip_rate"] = 3 * rate
+    assert evaluate(results(columns, T), index).number > 2 * by_quotient.number
+
+
+def test_the_strip_of_the_phase_plane_is_for_angles_only():
+    run = results({"plant.yaw_rate": SINE, "plant.sideslip": SINE}, T)
+    assert evaluate(run, metric("stability_index(yaw_rate)")) is None
+    assert evaluate(run, metric("phase_area(yaw_rate)")).unit == "(rad/s)2/s"
+    assert evaluate(run, metric("phase_area(sideslip)")).unit == "rad2/s"
+
+
+def test_the_catalogue_names_every_measure_with_definition_formula_and_unit():
+    found = {entry.name: entry for entry in catalogue()}
+    assert list(found) == list(measures.MEASURES)
+    assert all(entry.definition and entry.formula and entry.unit for entry in found.values())
+    assert not any("{" in entry.formula + entry.unit for entry in found.values())
+    assert mentions(found["total_variation_rate"].unit, "signal", "per")
+    assert found["overshoot"].needs == "a reference"
+
+
+def test_every_measure_can_be_applied_and_says_its_formula_and_unit():
+    for name, measure in measures.MEASURES.items():
+        if measure.signal:  # of other signals than this car has: tested above
+            continue
+        chosen = metric(f"{name}(sideslip){' at 2 s' if name == AT_A_TIME else ''}")
+        value = evaluate(car(1.2), chosen)
+        assert value is not None
+        assert value.number >= 0 or name in ("final", AT_A_TIME)
+        assert "{" not in chosen.formula
+        assert measure.definition
+
+
+def test_a_ratio_has_the_unit_of_its_number_and_is_shown_in_per_cent():
+    ratio = evaluate_all(car(0.8))["relative_peak_error(sideslip)"]
+    assert (ratio.number, ratio.unit) == (pytest.approx(0.2), "1")
+    assert shown(ratio.number, ratio.shown_in) == "20.0 %"
+    table = metrics_of_run(car(0.8), ["relative_peak_error(sideslip)"])
+    assert table.text()[0][-1] == "20.0 %"
+    assert (table.unit(2), table.values(2)) == ("1", [pytest.approx(0.2)])
+    again = replace(ratio, half=0.01)
+    assert (again.unit, again.shown_in) == ("1", "%")
+    verdict = compare(0.206, "at_most", 0.35, "%")
+    assert (verdict.value, verdict.unit, verdict.as_data()["unit"]) == (0.206, "1", "1")
+    judged = Evaluation("run")
+    judged.add("ratio", "a ratio", 0.206, "%")
+    quantity = judged.quantities["ratio"]
+    assert (quantity.value, quantity.unit, quantity.shown_in) == (0.206, "1", "%")
+    data = judged.as_data()["quantities"]["ratio"]
+    assert data == {"name": "a ratio", "value": 0.206, "unit": "1", "reading": ""}
+    (row,) = run_table(judged, "").text()
+    assert row[1] == "20.6 %"
+
+
+def test_a_recorded_signal_in_per_cent_is_shown_as_it_was_recorded():
+    charge = results({"battery.charge": [20.0, 20.6]}, units={"battery.charge": "%"})
+    other = results({"battery.charge": [20.0, 30.6]}, units={"battery.charge": "%"})
+    (parting,) = divergence(charge, other).partings
+    assert partings_table([parting]).text()[0][4] == "10.0 %"
+    figure = draw([LabelledRun("run", charge)], ["battery.charge"])
+    (line,) = figure.axes[0].get_lines()[:1]
+    assert line.get_ydata().tolist() == [20.0, 20.6]
+    value = evaluate(charge, metric("peak(battery.charge)"))
+    assert (value.number, value.unit) == (pytest.approx(0.206), "1")
+
+
+def test_units_of_metrics_follow_from_the_signal():
+    units = {name: value.unit for name, value in evaluate_all(car()).items()}
+    assert units["relative_peak_error(sideslip)"] == "1"  # shown in per cent
+    assert units["rms_error(yaw_rate)"] == "rad/s"
+    assert units["effort(yaw_moment)"] == "N.m.s"
+    assert units["total_variation_rate(yaw_moment)"] == "N.m/s"
+    assert units["settling_time(yaw_rate)"] == "s"
+    assert metric("slope_variation_rate(yaw_rate)").unit("rad/s") == "rad/s3"
+    assert metric("effort(velocity_x)").unit("m/s") == "m"
+    for odd in ("N/(m/s)", "m/s^3", "W/sr"):  # as other tools may write them
+        assert metric("effort(yaw_rate)").unit(odd) == f"{odd}.s"
+
+
+def test_metrics_find_signals_whatever_the_units_are_called():
+    renamed = results({"Fahrzeug.sideslip": 1.1 * SINE, "soll.sideslip_ref": SINE}, T)
+    assert evaluate_all(renamed)["relative_peak_error(sideslip)"].number == pytest.approx(0.1, rel=1e-6)
+
+
+def test_metrics_without_their_signals_are_absent():
+    without_reference = results({"plant.sideslip": SINE}, T)
+    assert set(evaluate_all(without_reference)) == {"peak(sideslip)", "stability_index(sideslip)"}
+
+
+def test_a_relative_error_against_a_reference_of_zero_is_absent():
+    straight = results({"plant.sideslip": SINE, "reference.sideslip_ref": 0 * SINE}, T)
+    without = {"mean_error(sideslip)", "rms_error(sideslip)", "peak(sideslip)", "stability_index(sideslip)"}
+    assert set(evaluate_all(straight)) == without
+
+
+def test_a_window_limits_a_metric_to_its_samples():
+    ramp = results({"plant.sideslip": T}, T)
+    assert evaluate(ramp, metric("peak(sideslip)"), (0.0, 0.5)).number == pytest.approx(0.5)
+    assert evaluate(ramp, metric("displacement(sideslip)"), (0.5, 2.0)).number == pytest.approx(1.5)
+    assert evaluate(ramp, metric("peak(sideslip)"), (5.0, 6.0)) is None
+
+
+def test_a_window_that_the_run_does_not_last_for_gives_no_number():
+    ramp = results({"plant.sideslip": T}, T)
+    assert evaluate(ramp, metric("peak(sideslip)"), (0.5, float(T[-1]))) is not None
+    assert evaluate(ramp, metric("peak(sideslip)"), (0.5, float(T[-1]) + 0.5)) is None
+    assert evaluate(ramp, metric("peak(sideslip)"), (float(T[0]) - 0.5, 0.5)) is None
+
+
+def test_the_largest_of_four_wheels_counts():
+    columns = {f"actuator.wheel_torque_{w}": k * T for k, w in enumerate(("fl", "fr", "rl", "rr"))}
+    wheels = results(columns, T, dict.fromkeys(columns, "N.m"))
+    assert evaluate(wheels, metric("peak(wheel_torque_*)")).number == pytest.approx(6.0)
+
+
+def test_the_output_that_feeds_an_input_is_the_signal_of_that_name():
+    columns = {"mine.Mz": 2 * T, "mine.beta": T, "plant.yaw_rate": T}
+    run = results(columns, T, {"mine.Mz": "N.m", "mine.beta": "deg", "plant.yaw_rate": "rad/s"})
+    assert evaluate(run, metric("peak(yaw_moment)")) is None
+    wires = [
+        {"from": "mine.Mz", "to": "allocator.yaw_moment"},
+        {"from": "mine.Mz", "to": "plant.yaw_moment"},
+        {"from": "mine.beta", "to": "driver.sideslip", "gain": np.pi / 180, "offset": 0.0, "unit": "rad"},
+        {"from": "plant.yaw_rate", "to": "driver.turn", "gain": -1.0, "offset": 0.0, "unit": "rad/s"},
+    ]
+    noted(run, connections=wires)
+    assert evaluate(run, metric("peak(yaw_moment)")) == MetricValue(2 * T[-1], "N.m")
+    assert evaluate(run, metric("peak(sideslip)")) == MetricValue(pytest.approx(np.radians(T[-1])), "rad")
+    assert evaluate(run, metric("peak(turn)")) is None  # another sign is another signal
+    assert [panel.name for panel in shown_by([LabelledRun("a", run)], ["yaw_moment", "turn"])] == [
+        "yaw_moment"
+    ]
+
+
+def test_values_in_other_units_are_measured_and_drawn_in_si():
+    run = results({"mine.yaw_moment": T}, T, {"mine.yaw_moment": "kN.m"})
+    assert evaluate(run, metric("peak(yaw_moment)")) == MetricValue(pytest.approx(1000 * T[-1]), "N.m")
+    assert shown_unit("kN.m") == ("N·m", 1000.0)
+    assert shown_unit("deg") == ("°", pytest.approx(1.0))
+    assert shown_unit("widgets") == ("widgets", 1.0)
+
+
+def test_torque_requests_stand_in_where_no_actuator_is_between():
+    run = car(chatter=100.0)
+    asked = evaluate(run, metric("total_variation_rate(torque_request_*)"))
+    assert evaluate(run, metric("total_variation_rate(wheel_torque_*)")) == asked
+
+
+def test_of_two_units_with_the_signal_the_plants_counts():
+    both = results({"estimator.sideslip": 0 * T, "plant.sideslip": SINE}, T)
+    assert evaluate(both, metric("peak(sideslip)")).number == pytest.approx(1.0)
+    assert evaluate(both, metric("peak(estimator.sideslip)")).number == 0.0
+
+
+WATCHED = {
+    "estimator.sideslip": 1.2 * SINE,
+    "gyro.yaw_rate": 7.0 * SINE,
+    "gyro.steer_angle": 9.0 * SINE,
+    "driver.steer_angle": 2.0 * SINE,
+    "plant.sideslip": SINE,
+    "plant.yaw_rate": 3.0 * SINE,
+    "reference.yaw_rate_ref": 4.0 * SINE,
+    "ideal.yaw_rate_ref": 2.5 * SINE,
+}
+"""Columns of a car that is measured and estimated, with a reference beside the one in the loop."""
+
+
+def watched():
+    """Return the recorded run of such a car."""
+    units = {name: "rad/s" if "rate" in name else "rad" for name in WATCHED}
+    run = results(WATCHED, T, units)
+    wire = ConnectionRecord(source="reference.sideslip_ref", target="controller.sideslip_ref")
+    run.record.connections.append(wire)
+    return noted(run, fmus={"gyro": {"name": "sensor_cluster"}})
+
+
+@pytest.mark.parametrize(
+    ("name", "number"),
+    [
+        ("peak_error(estimator.sideslip, plant.sideslip)", 0.2),
+        ("peak( estimator.sideslip-plant.sideslip )", 0.2),
+        ("rms(estimator.sideslip - sideslip)", 0.2 / math.sqrt(2)),
+        ("value(gyro.yaw_rate - plant.yaw_rate) at 0.25 s", 4.0),
+        ("relative_peak_error(yaw_rate)", 0.25),  # against the reference that acts
+        ("relative_peak_error(yaw_rate, ideal.yaw_rate_ref)", 0.2),  # against the truth
+        ("peak(steer_angle)", 2.0),  # the driver's, not what is measured of it
+        ("phase_area(estimator.sideslip - plant.sideslip)", 0.04 * 4 * math.pi**2),
+    ],
+)
+def test_a_metric_compares_two_named_columns(name, number):
+    assert evaluate(watched(), metric(name)).number == pytest.approx(number, rel=1e-4)
+
+
+def test_a_bare_name_never_means_what_is_only_measured_or_estimated():
+    seen = results({"gyro.yaw_rate": SINE, "estimator.sideslip": SINE, "estimator.sideslip_rate": 9 * SINE,
+                    "plant.sideslip": SINE}, T)  # fmt: skip
+    noted(seen, fmus={"gyro": {"name": "sensor_cluster"}, "estimator": {"name": "estimator_a"}})
+    assert evaluate(seen, metric("peak(yaw_rate)")) is None
+    assert evaluate(seen, metric("peak(gyro.yaw_rate)")).number == pytest.approx(1.0, rel=1e-4)
+    of_truth = evaluate(seen, metric("phase_area(sideslip)")).number  # by the slope of the car's own
+    assert of_truth == pytest.approx(evaluate(results({"plant.sideslip": SINE}, T),
+                                              metric("phase_area(sideslip)")).number)  # fmt: skip
+
+
+def test_wheels_are_compared_in_pairs_and_units_converted():
+    columns = {
+        f"{unit}.load_{w}": k * f * T for k, w in enumerate(WHEELS) for unit, f in [("a", 1), ("b", 2)]
+    }
+    run = results(columns, T, {name: "N" if name[0] == "a" else "kN" for name in columns})
+    assert evaluate(run, metric("peak(a.load_* - b.load_*)")) == MetricValue(
+        pytest.approx(1999.0 * 3 * 2), "N"
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "names"),
+    [
+        ("rms_error(x - y)", ("rms_error", "compares", "reference")),
+        ("rms(x, y)", ("difference", "reference", "rms")),
+    ],
+)
+def test_two_columns_that_are_not_compared_so_are_an_error(name, names):
+    with refused(ScenarioError, names=names):
+        metric(name)
+
+
+def test_an_unknown_measure_is_an_error_that_names_the_nearest():
+    with refused(ScenarioError, "metric-unknown", names=("'peek(sideslip)'", "'peek'", "'peak'")):
+        metric("peek(sideslip)")
+    with refused(
+        ScenarioError,
+        "metric-unknown",
+        names=("'sideslip'", "'peak(sideslip)'", "measure(signal)", "relative_peak_error(sideslip)"),
+    ):
+        metric("sideslip")
+
+
+def test_numbers_are_shown_in_the_units_people_read():
+    assert shown(0.0349, "rad") == "2.00 °"
+    assert shown(25.0, "m/s") == "90.0 km/h"
+    assert shown(0.0394, "%") == "3.94 %"
+    assert shown(14180.0, "N.m/s") == "14.2 kN·m/s"
+    assert shown(2.513, "%") == "251 %"
+    assert shown(math.inf, "s") == "never"
+    assert digits_of(0.0996) == "0.0996"
+    assert digits_of(0.9996) == "1.00"
+    assert digits_of(12345.0) == "12345"
+
+
+@pytest.mark.parametrize(
+    ("name", "meant"),
+    [
+        ("peak_sideslip", "peak(sideslip)"),
+        ("rms_error_yaw_rate", "rms_error(yaw_rate)"),
+        ("peak(sideslip", "peak(sideslip)"),
+    ],
+)
+def test_a_metric_written_otherwise_is_asked_whether_it_is_meant(name: str, meant: str) -> None:
+    with pytest.raises(ScenarioError) as caught:
+        metric(name)
+    assert caught.value.code == "metric-unknown"
+    assert mentions(str(caught.value), "measure(signal)", f"'{meant}'")
+
+
+@pytest.mark.parametrize(
+    "text", ["from 0.5 s to 1.5 s", "from 500 ms to 1.5 s", "from 0.5 to 1.5 s", "0.5 to 1.5"]
+)
+def test_a_metric_may_be_of_a_stretch_of_time(text):
+    run = results({"plant.sideslip": T}, T)
+    chosen = metric(f"peak(sideslip) {text}")
+    assert mentions(chosen.name, "peak(sideslip)", "0.5 s", "1.5 s")
+    assert metric(chosen.name) == chosen
+    assert evaluate(run, chosen) == evaluate(run, metric("peak(sideslip)"), (0.5, 1.5))
+    assert evaluate(run, chosen).number == pytest.approx(1.5)
+    assert mentions(chosen.title, "0.5", "1.5 s", "Sideslip", "angle")
+
+
+def test_a_value_may_be_of_a_point_of_time():
+    run = results({"plant.sideslip": T}, T)
+    chosen = metric("value(sideslip) at 750 ms")
+    assert mentions(chosen.name, "value(sideslip)", "0.75 s")
+    assert mentions(chosen.title, "0.75 s", "Sideslip", "angle")
+    assert evaluate(run, chosen).number == pytest.approx(0.75)
+    assert evaluate(run, metric("value(sideslip) at 9 s")) is None
+
+
+@pytest.mark.parametrize(
+    ("name", "names"),
+    [
+        ("peak(sideslip) at 2 s", ("2 s", "point", "time")),
+        ("value(sideslip)", ("sideslip", "point", "time")),
+        ("peak(sideslip) from 3 s to 1 s", ("ends", "begins")),
+        ("peak(sideslip) during 3 s", ("1 s", "3 s", "2 s")),
+        ("peak(sideslip) from 1 kg to 3 s", ("'1 kg'", "value")),
+    ],
+)
+def test_a_window_that_is_none_is_said(name, names):
+    with refused(ScenarioError, names=names):
+        metric(name)
+
+
+# Angles of a velocity, while the car moves
+
+
+def moving_car(speeds, sideslip, *, rate=None, sideways=True, unit="rad", speed_unit="m/s", **more):
+    """Return a run with a speed [m/s] and a sideslip [rad] per row, every 0.1 s."""
+    speeds, sideslip = np.array(speeds, float), np.array(sideslip, float)
+    columns = {"plant.velocity_x": speeds * np.cos(sideslip) * (3.6 if speed_unit == "km/h" else 1.0)}
+    units = {"plant.velocity_x": speed_unit, "plant.velocity_y": "m/s"}
+    if sideways:
+        columns["plant.velocity_y"] = speeds * np.sin(sideslip)
+    columns["plant.sideslip"] = np.degrees(sideslip) if unit == "deg" else sideslip
+    if rate is not None:
+        columns["plant.sideslip_rate"] = np.array(rate, float)
+    columns |= {name.replace("__", "."): np.array(values, float) for name, values in more.items()}
+    units |= {name: "rad" for name in columns if name not in units} | {"plant.sideslip": unit, "time": "s"}
+    record = RunRecord(fmus={"plant": FmuRecord(name="plant_x", role="plant")})
+    return Results(Path(), 0.1 * np.arange(speeds.size), columns, units, record)
+
+
+def of(results, name):
+    value = evaluate(results, metric(name))
+    return None if value is None else value.number
+
+
+@pytest.mark.parametrize("sideways", [True, False])
+@pytest.mark.parametrize(("unit", "speed_unit"), [("rad", "m/s"), ("deg", "km/h")])
+def test_the_sideslip_of_a_car_that_brakes_straight_to_rest_is_that_while_it_moves(
+    sideways, unit, speed_unit
+):
+    speeds = [20.0, 10.0, 4.0, 0.001, 0.0, 0.0]
+    run = moving_car(
+        speeds, [0.0, 0.02, 0.01, np.pi, -np.pi, 3.0], sideways=sideways, unit=unit, speed_unit=speed_unit
+    )
+    assert of(run, "peak(sideslip)") == pytest.approx(0.02)
+    assert of(run, "final(sideslip)") == pytest.approx(0.01)
+    assert of(run, "value(sideslip) at 0.4 s") is None
+    assert of(run, "peak(sideslip) from 0.3 s to 0.5 s") is None
+    assert of(run, "peak(velocity_x)") == pytest.approx(20.0)
+    shown = while_moving(run).columns["plant.sideslip"]
+    assert np.isnan(shown).tolist() == [False] * 3 + [True] * 3
+    assert not np.isnan(run.columns["plant.sideslip"]).any()  # what was recorded stays
+
+
+def test_a_car_that_spins_at_speed_and_comes_to_rest_has_spun():
+    turned = np.radians([0.0, 30.0, 90.0, 150.0, -170.0, -170.0])
+    run = moving_car([20.0, 18.0, 15.0, 12.0, 8.0, 0.0], turned)
+    assert of(run, "peak(sideslip)") == pytest.approx(np.radians(170.0))
+    assert of(run, "total_variation(sideslip)") == pytest.approx(np.radians(190.0))  # on through 180 degrees
+
+
+def test_a_car_that_starts_from_rest_and_one_that_never_moves():
+    run = moving_car([0.0, 0.0, 5.0, 10.0], [np.pi, -np.pi, 0.1, 0.05])
+    assert of(run, "peak(sideslip)") == pytest.approx(0.1)
+    stands = moving_car([0.0, 0.1, 0.0], [np.pi, 1.0, 2.0])
+    assert of(stands, "peak(sideslip)") is None
+    assert "10 km/h" in why_none(stands, metric("peak(sideslip)"), None, 0.2)
+
+
+def test_the_clock_of_a_mean_stands_while_the_car_does():
+    stop = moving_car([10, 10, 10, 0, 0, 0, 0, 10, 10, 10], [0.1, 0.1, 0.1, 3, -3, 3, -3, 0.3, 0.3, 0.3])
+    assert of(stop, "rms(sideslip)") == pytest.approx(
+        of(moving_car([10] * 6, [0.1] * 3 + [0.3] * 3), "rms(sideslip)")
+    )
+    assert of(stop, "effort(sideslip)") == pytest.approx(0.02 + 0.02 + 0.06)
+
+
+def test_no_rate_jumps_where_a_sideslip_wraps_at_180_degrees():
+    turned = np.radians([150.0, 170.0, -170.0, -150.0, -130.0])
+    run = moving_car([10.0] * 5, turned)
+    assert of(run, "phase_area(sideslip)") == pytest.approx(np.radians(200.0) ** 2 * 0.4)
+    reference = moving_car([10.0] * 5, turned, reference__sideslip_ref=np.radians([150, 175, 178, 179, 180]))
+    assert of(reference, "peak_error(sideslip)") == pytest.approx(np.radians(50.0))
+
+
+def test_slip_angles_and_estimates_count_while_the_true_car_moves():
+    more = {f"plant__slip_angle_{wheel}": [0.1, 0.2, np.pi] for wheel in ("fl", "fr", "rl", "rr")}
+    run = moving_car([10.0, 10.0, 0.0], [0.0, 0.0, 2.0], estimator__sideslip=[0.01, 0.02, -3.0], **more)
+    run.record.fmus["estimator"] = FmuRecord(name="estimator_x", role="estimator")
+    assert of(run, "peak(slip_angle_*)") == pytest.approx(0.2)
+    assert of(run, "peak(estimator.sideslip)") == pytest.approx(0.02)
+    assert of(run, "peak(estimator.sideslip - plant.sideslip)") == pytest.approx(0.02)
+
+
+def test_without_a_speed_a_sideslip_is_taken_as_it_is():
+    run = moving_car([0.0, 0.0], [3.0, 0.1])
+    del run.columns["plant.velocity_x"]
+    assert of(run, "peak(sideslip)") == 3.0
+
+
+def test_a_line_has_a_gap_while_the_car_stands_and_keeps_its_time():
+    from yawbench.figures.plots import draw
+
+    run = moving_car([20.0, 15.0, 10.0, 5.0, 0.0, 0.0], [0.0, 0.02, 0.01, 0.0, np.pi, -np.pi])
+    figure = draw([LabelledRun("a", run)], ["sideslip", "velocity_x", "velocity_x(sideslip)"])
+    of_slip, of_speed = figure.axes[:2]
+    (line,) = of_slip.get_lines()
+    assert np.nanmax(np.abs(line.get_ydata())) == pytest.approx(np.degrees(0.02))
+    assert of_slip.get_xlim() == pytest.approx(of_speed.get_xlim())
+    assert max(map(abs, figure.axes[2].get_xlim())) < 2.0

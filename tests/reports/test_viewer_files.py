@@ -1,0 +1,175 @@
+"""What the viewer saves, what it draws of hidden runs, and the digits and signals that it knows."""
+
+from __future__ import annotations
+
+import csv
+import io
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.reports.browser import Browser
+from tests.reports.made_up import whole_car
+from yawbench.figures.panels import LabelledRun
+from yawbench.reports.viewer import Settings, View, page
+from yawbench.reports.viewer_data import COARSE
+
+VIEWER = "const viewer = document.querySelector('.yv').viewer;"
+A, B, C = "no control", "fuzzy, new", "third/law"
+ADD = (
+    VIEWER + "const add = document.querySelector('.yv-add'); add.value = arguments[0];"
+    "add.dispatchEvent(new Event('change'));"
+    "return [viewer.state.panels.at(-1), add.validationMessage, viewer.state.panels.length];"
+)
+SAVED = (
+    VIEWER + "const names = [], create = document.createElement.bind(document);"
+    "document.createElement = (tag) => { const one = create(tag); if (tag === 'a') {"
+    "  one.click = () => names.push(one.download); } return one; };"
+    "document.querySelector('.yv-csv').click();"
+    "viewer.find('png').click(); const done = arguments[arguments.length - 1];"
+    "const look = () => names.length === 2 ? done(names) : requestAnimationFrame(look); look();"
+)
+WORDS = (
+    VIEWER + "const said = [], old = CanvasRenderingContext2D.prototype.fillText;"
+    "CanvasRenderingContext2D.prototype.fillText = function (words, ...at) { said.push([words, ...at]); };"
+    "const sheet = viewer.picture(); CanvasRenderingContext2D.prototype.fillText = old;"
+    "return [said, sheet.width];"
+)
+
+
+def tiny(results, size: float = 1e-7):
+    """Return a run whose sideslip is next to nothing in its second half."""
+    late = results.time > 0.5 * results.time[-1]
+    small = np.where(late, size * np.sin(50.0 * results.time), results["plant.sideslip"])
+    return replace(results, columns={**results.columns, "plant.sideslip": small})
+
+
+@pytest.fixture(scope="module")
+def three(tmp_path_factory) -> Path:
+    """A page of three runs; the second has instants and limits of its own."""
+    file = tmp_path_factory.mktemp("files") / "three.html"
+    runs = [LabelledRun(A, whole_car()), LabelledRun(B, whole_car(2.0)), LabelledRun(C, tiny(whole_car(0.5)))]
+    settings = Settings(
+        [View(panels=("sideslip", "yaw_rate"))],
+        marks=[(1.0, "beginning")], limits=[("yaw_rate", 9.0, "too much")], dashed_of=1,
+    )  # fmt: skip
+    file.write_text(page(runs, settings), "utf-8")
+    return file
+
+
+def opened(chromium: Browser, file: Path, fragment: str = "") -> None:
+    chromium.open(file, fragment)
+    chromium.wait_for("document.querySelector('.yv-ready')")
+
+
+def test_files_of_runs_are_named_by_the_page_alone(chromium, three):
+    opened(chromium, three)
+    assert chromium.driver.execute_async_script(SAVED) == ["run.csv", "run.png"]
+    words = [text for text, *_ in chromium.run(WORDS)[0]]
+    assert words[:3] == [A, B, C] and not any("minus" in text for text in words)
+
+
+@pytest.mark.parametrize("shown", [[0, 1], [0, 1, 2], [1, 2]])
+def test_files_of_a_difference_say_so(shown, chromium, three):
+    opened(chromium, three, f"run?difference=true&shown={shown}".replace(" ", ""))
+    drawn = [label for k, label in enumerate((A, B, C)) if k in shown and k]
+    for name, suffix in zip(chromium.driver.execute_async_script(SAVED), (".csv", ".png"), strict=True):
+        assert name.startswith("run_") and name.endswith(f"minus_no_control{suffix}")
+        assert "/" not in name and "fuzzy,_new" in name
+    said, wide = chromium.run(WORDS)
+    title, *legend = (text for text, *_ in said[: 1 + len(drawn)])
+    assert title == f"{', '.join(drawn)} minus {A}"
+    assert legend == [f"{label} minus {A}" for label in drawn]  # the baseline is not drawn
+    headings = [text for text, *_ in said[1 + len(drawn) :]]
+    assert headings and all(text.endswith(f"minus {A}") for text in headings)
+    assert all(x < wide for _, x, *_ in said)
+    rows = [*csv.DictReader(io.StringIO(chromium.run(VIEWER + "return viewer.csv()")))]
+    assert {row["run"] for row in rows} == {f"{label} minus {A}" for label in drawn}
+    of_b = [row for row in rows if row["run"].startswith(B)]
+    expected = whole_car(2.0)["plant.yaw_rate"] - whole_car()["plant.yaw_rate"]
+    values = [float(row["plant.yaw_rate [rad/s]"]) for row in of_b]
+    step = np.ptp([whole_car(2.0)["plant.yaw_rate"].max(), whole_car(2.0)["plant.yaw_rate"].min()]) / COARSE
+    np.testing.assert_allclose(values, expected, atol=2.0 * step)
+    assert "reference.yaw_rate_ref [rad/s]" not in rows[0]
+
+
+DASHED = (
+    VIEWER + "const panel = viewer.panels.find((one) => one.spec.startsWith('plant.yaw_rate'));"
+    "const c = panel.plot.ctx, old = c.moveTo; let count = 0; c.moveTo = (x, y) => { count += 1; };"
+    "panel.above(panel.plot, panel.meaning.factor); delete c.moveTo;"
+    "return [count, panel.heights(panel.shown, panel.meaning.factor)[1]];"
+)
+
+
+def test_hiding_a_run_takes_its_instants_and_limits_along(chromium, three):
+    opened(chromium, three)
+    count, high = chromium.run(DASHED)
+    assert count == 2 and high > np.degrees(9.0)
+    chromium.run("document.querySelectorAll('.yv-show')[1].click()")
+    count, high = chromium.run(DASHED)
+    assert count == 0 and high < np.degrees(9.0)
+    chromium.run("document.querySelectorAll('.yv-show')[1].click()")
+    assert chromium.run(DASHED)[0] == 2
+
+
+AT = VIEWER + (
+    "viewer.state.time = arguments[0]; viewer.moveCursor();"
+    "return [...viewer.panels[0].body.rows].map((row) => row.cells[1].textContent);"
+)
+
+
+@pytest.mark.parametrize(
+    "fragment", ["", "run?difference=true", 'run?panels=["plant.sideslip - plant.yaw_rate"]']
+)
+def test_values_at_the_cursor_have_no_digits_finer_than_the_samples(fragment, chromium, three):
+    opened(chromium, three, fragment)
+    ranges = [np.ptp([f(run[name]) for run in (whole_car(), whole_car(2.0)) for f in (np.max, np.min)])
+              for name in ("plant.sideslip", "plant.yaw_rate")]  # fmt: skip
+    times = whole_car().time
+    step = np.degrees(ranges[0]) / COARSE
+    many = [chromium.run(AT, float(t)) for t in times[times > 0.6 * times[-1]][::40]]
+    texts = [text for row in many for text in row if text not in ("–", "0")]
+    assert texts
+    for text in texts:
+        decimals = len(text.partition(".")[2].partition("e")[0])
+        unit = 10.0 ** (int((text.partition("e")[2] or "0").replace("−", "-")) - decimals)
+        assert unit >= 0.99 * step, text
+
+
+@pytest.mark.parametrize(
+    ("text", "signal"),
+    [
+        ("plant.velocity_x", "plant.velocity_x"),
+        ("Longitudinal velocity", "plant.velocity_x"),
+        ("longitudinal velocity in km/h", "plant.velocity_x"),
+        ("velocity_x", "plant.velocity_x"),
+        (" YAW_MOMENT ", "controller.yaw_moment"),
+        ("plant.sideslip - reference.sideslip_ref", "plant.sideslip - reference.sideslip_ref"),
+        ("plant.velocity_x, yaw_moment", "plant.velocity_x,controller.yaw_moment"),
+    ],
+)
+def test_signals_are_added_by_name_variable_or_label(text, signal, chromium, three):
+    opened(chromium, three)
+    assert chromium.run(ADD, text)[:2] == [signal, ""]
+
+
+def test_what_is_not_one_signal_is_answered(chromium, three, tmp_path):
+    opened(chromium, three)
+    _, several, panels = chromium.run(ADD, "tyre_force_x")
+    assert panels == 2 and "tyre.tyre_force_x_fl" in several and "tyre.tyre_force_x_rr" in several
+    _, none, panels = chromium.run(ADD, "plant.nothing")
+    assert panels == 2 and "plant.nothing" in none and "recorded" in none
+    axis = (
+        VIEWER + "const x = document.querySelector('.yv-x'); x.value = arguments[0];"
+        "x.dispatchEvent(new Event('change')); return [viewer.state.x, x.validationMessage];"
+    )
+    assert chromium.run(axis, "velocity_x") == ["plant.velocity_x", ""]
+    chosen, none = chromium.run(axis, "plant.nothing")
+    assert chosen == "plant.velocity_x" and "plant.nothing" in none
+    some = page([LabelledRun(A, whole_car())], Settings([View(panels=["sideslip"])], largest=1))
+    (tmp_path / "some.html").write_text(some, "utf-8")
+    opened(chromium, tmp_path / "some.html")
+    _, left_out, _ = chromium.run(ADD, "acceleration_y")
+    assert "acceleration_y" in left_out and "yawbench plot --page" in left_out

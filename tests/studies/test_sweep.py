@@ -1,0 +1,520 @@
+"""Sweeps from the file to the table: processes, failures, kills, resuming, a Dask cluster."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import signal
+import subprocess
+import sys
+
+import pyarrow.parquet as pq
+import pytest
+from lxml import html
+
+from tests.refusals import mentions, refused
+from tests.reports.made_up import unpacked
+from yawbench.cli import main
+from yawbench.fmus.build import build_component
+from yawbench.foundation.errors import Diagnostic, Location, ResultsError
+from yawbench.orchestrator.results.reader import load_results
+from yawbench.studies.executor import finish
+from yawbench.studies.jobs import Job, MeasuredRun, Outcome
+from yawbench.studies.journal import Journal
+
+UNIT = '''
+import os
+import signal
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from yawbench.components.fmi.component import Component
+from yawbench.components.fmi.variables import parameter
+
+HERE = Path({folder!r})
+
+
+@dataclass(frozen=True)
+class Levels:
+    level: float = parameter(0.0, "N.m", "What it does")
+
+
+class Moody(Component):
+    """A controller that does what its level says."""
+
+    Parameters = Levels
+    inputs = ("steer_angle",)
+    outputs = ("yaw_moment",)
+    sampled = True
+
+    def advance(self, t, h, u):
+        level = self.p.level
+        if t < 0.045:
+            return
+        if level == 20:
+            raise ValueError("twenty is too much")
+        if level == 30:
+            os.kill(os.getpid(), signal.SIGKILL)
+        while level == 35:
+            time.sleep(1)
+        if level in (40, 50) and not (HERE / str(int(level))).exists():
+            (HERE / str(int(level))).touch()
+            os.kill(os.getpid(), signal.SIGKILL if level == 40 else signal.SIGTERM)
+        if level >= 60 and (HERE / "slow").exists():
+            if t < 0.055:
+                (HERE / "slow").write_text("it has begun")  # waits for somebody to read
+            time.sleep(0.05)
+
+    def output(self, t, u):
+        return (self.p.level * t,)
+'''
+
+SCENARIO = """
+title: A moody pair
+stop_time: 0.1
+step_size: 0.01
+units:
+  driver: {{fmu: driver_sine, parameters: {{frequency: 2.5, start_time: 0}}}}
+  controller: {{fmu: {controller}}}
+"""
+
+SWEEP = """
+title: Moods
+source: made up
+scenario: pair.yaml
+axes:
+  level: {{vary: controller.level, values: {levels}, says: Level}}
+  amplitude: {{vary: driver.amplitude, from: 1, to: 3, count: {count}, unit: deg}}
+metrics:
+  moment: {{metric: peak(yaw_moment), heading: Largest moment}}
+  steer: {{metric: peak(steer_angle)}}
+limits:
+  calm: {{says: Calm up to, of: level, holds_if: [{{metric: moment, at_most: 3.5 N.m}}]}}
+"""
+
+FIGURES = """
+figures:
+  - {name: curve, kind: curve, metric: moment, x: level, lines: amplitude, mark: 2 N.m}
+  - {name: map, kind: map, metric: moment, x: level, y: amplitude, mark: 2 N.m}
+  - {name: limit, kind: limit, limit: calm, x: amplitude}
+"""
+
+
+UNITS = ("driver_sine",)
+
+
+@pytest.fixture
+def moods(tmp_path, fmus):
+    """Write a sweep over levels; return its file."""
+    (tmp_path / "moody.py").write_text(UNIT.format(folder=str(tmp_path)), encoding="utf-8")
+    fmu = build_component(tmp_path / "moody.py", tmp_path, role="controllers")
+    (tmp_path / "pair.yaml").write_text(SCENARIO.format(controller=fmu.name))
+
+    def make(*levels, count=2):
+        file = tmp_path / "moods.yaml"
+        file.write_text(SWEEP.format(levels=list(levels), count=count))
+        return file
+
+    return make
+
+
+@pytest.fixture
+def yawbench(fmus, capfd, tmp_path):
+    """Run a sweep into a folder, in one process unless told; return exit status, stdout and stderr."""
+
+    def run(file, out, *arguments):
+        if not {"--jobs", "--scheduler"} & {*arguments}:
+            arguments = (*arguments, "--jobs", "1")
+        with pytest.raises(SystemExit) as end:
+            main(["sweep", str(file), "--out", str(tmp_path / out), "--fmus", str(fmus), *arguments])
+        told = capfd.readouterr()
+        return end.value.code or 0, told.out, told.err
+
+    return run
+
+
+def rows(folder):
+    return pq.read_table(folder / "table.parquet").to_pylist()
+
+
+def journal(folder):
+    return [json.loads(line) for line in (folder / "runs.jsonl").read_text().splitlines()[1:]]
+
+
+def test_one_row_per_run_with_units_and_figures_and_a_page(moods, yawbench, tmp_path):
+    file = moods(10, 40, 60)
+    file.write_text(file.read_text() + FIGURES)
+    status, out, err = yawbench(file, "out")
+    assert status == 0, err
+    table = pq.read_table(tmp_path / "out" / "table.parquet")
+    assert table.column_names == [
+        "run", "level", "amplitude", "status", "reason", "warnings", "moment", "steer", "key",
+    ]  # fmt: skip
+    units = {field.name: (field.metadata or {}).get(b"unit", b"").decode() for field in table.schema}
+    assert units["level"] == units["moment"] == "N.m"
+    assert units["amplitude"] == units["steer"] == "rad"
+    found = table.to_pylist()
+    assert [row["run"] for row in found] == [1, 2, 3, 4, 5, 6]
+    assert [row["moment"] for row in found] == pytest.approx([1, 1, 4, 4, 6, 6])
+    assert [row["steer"] for row in found] == pytest.approx([row["amplitude"] for row in found], rel=1e-9)
+    assert {row["status"] for row in found} == {"completed"}
+    about = json.loads(table.schema.metadata[b"experiment"])
+    assert about["experiment"]["title"] == "Moods"
+    assert len(about["fmus"]) == 2
+    assert mentions(out, "N.m", "Calm")
+    figures = {path.name for path in (tmp_path / "out" / "figures").iterdir()}
+    assert figures == {f"{name}.{kind}" for name in ("curve", "map", "limit") for kind in ("png", "svg")}
+    page = html.fromstring(unpacked(tmp_path / "out" / "report.html"))
+    assert page.cssselect("h1")[0].text_content() == "Moods"
+    assert page.cssselect("figure.chart") == []  # the map and the coordinates show them
+    files = page.xpath("//details//li/code/text()")
+    assert [one for one in files if one.endswith(".svg")] == [
+        f"figures/{name}.svg" for name in ("curve", "map", "limit")
+    ]
+    assert mentions(page.text_content(), "N.m", "Calm")
+    assert len(list(csv.DictReader((tmp_path / "out" / "table.csv").open()))) == 6
+
+
+@pytest.mark.exhaustive
+def test_the_table_is_the_same_to_the_byte_however_many_workers(moods, yawbench, tmp_path):
+    file = moods(5, 20, count=2)
+    for workers in ("1", "3"):
+        assert yawbench(file, workers, "--jobs", workers)[0] == 1  # level 20 fails
+    tables = {(tmp_path / workers / "table.parquet").read_bytes() for workers in "13"}
+    assert len(tables) == 1
+
+
+def test_a_run_that_fails_is_a_row_with_its_reason_and_is_not_made_again(moods, yawbench, tmp_path):
+    file = moods(10, 20)
+    status, _, err = yawbench(file, "out")
+    assert status == 1
+    failed = [row for row in rows(tmp_path / "out") if row["status"] == "failed"]
+    assert [row["level"] for row in failed] == [20, 20]
+    assert failed[0]["moment"] is None
+    assert mentions(
+        failed[0]["reason"], "controller", "0.05 s", "ValueError", "controllers/moody.py:32", "twenty"
+    )
+    assert mentions(err, "20 N.m", "1 deg", "level", "amplitude")
+    assert mentions(unpacked(tmp_path / "out" / "report.html"), "20 N.m", "1 deg", "level", "amplitude")
+    before = (tmp_path / "out" / "runs.jsonl").read_bytes()
+    table = (tmp_path / "out" / "table.parquet").read_bytes()
+    status, _, err = yawbench(file, "out")
+    assert status == 1
+    assert mentions(err, "all finished already")
+    assert (tmp_path / "out" / "runs.jsonl").read_bytes() == before
+    assert (tmp_path / "out" / "table.parquet").read_bytes() == table
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="needs a limit on the size of files")
+def test_runs_that_met_a_full_disk_are_made_again(moods, yawbench, tmp_path):
+    import resource
+
+    file = moods(10, 20)
+    file.write_text(file.read_text() + "keep: all\nstop_time: 10\n")
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, limits[1]))
+    try:
+        assert yawbench(file, "out")[0] in (1, 2)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    yawbench(file, "out")
+    found = rows(tmp_path / "out")
+    assert [row["status"] for row in found] == ["completed"] * 2 + ["failed"] * 2
+    assert "twenty is too much" in found[2]["reason"]
+    completed = [load_results(path.parent) for path in (tmp_path / "out").rglob("results.csv")]
+    assert sorted(len(results.time) for results in completed) == [6, 6, 1001, 1001]
+    assert len(journal(tmp_path / "out")) == 4
+    assert "4 runs, all finished already" in yawbench(file, "out")[2]
+
+
+@pytest.mark.parametrize(
+    ("code", "again"),
+    [
+        ("results-unwritable", True),
+        ("run-process-died", True),
+        ("memory-exhausted", True),
+        ("run-failed", False),
+        ("fmu-call-failed", False),
+        ("fmu-process-died", False),
+        ("value-not-finite", False),
+    ],
+)
+def test_what_failed_for_a_reason_of_the_machine_is_made_again(code, again, tmp_path):
+    failed = MeasuredRun({}, (Diagnostic(code, "why"),))
+
+    def runner(jobs, done):
+        for job in jobs:
+            done(Outcome(job, failed.diagnostics, 1))
+
+    resumed = Journal(tmp_path, "a/b.yaml")
+    finish([Job("one", tmp_path, tmp_path, key="one")], resumed, runner=runner)
+    resumed.close()
+    assert len(journal(tmp_path)) == (0 if again else 1)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="--isolate needs Linux or macOS")
+@pytest.mark.parametrize("isolated", [(), ("--isolate",)])
+def test_a_run_whose_instance_is_killed_is_made_again_on_resuming(isolated, moods, yawbench, tmp_path):
+    file = moods(10, 30)
+    file.write_text(file.read_text() + "keep: all\n")
+    assert yawbench(file, "out", *isolated)[0] == 1
+    assert len(journal(tmp_path / "out")) == 2
+    assert "4 runs, 2 finished already" in yawbench(file, "out", *isolated)[2]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="--isolate needs Linux or macOS")
+@pytest.mark.exhaustive
+def test_isolated_runs_that_hang_or_crash_are_rows_that_name_the_unit(moods, yawbench, tmp_path):
+    file = moods(10, 30, 35)
+    status, _, err = yawbench(file, "out", "--isolate", "--call-limit", "3 s")
+    assert status == 1, err
+    *calm, crashed, _, hung, _ = rows(tmp_path / "out")
+    assert "controller" in crashed["reason"]
+    assert "SIGKILL" in crashed["reason"]
+    assert "controller" in hung["reason"]
+    assert mentions(hung["reason"], "3 s", "return")
+    yawbench(moods(10), "together")
+    assert calm == rows(tmp_path / "together")
+
+
+@pytest.mark.parametrize("level", [40, 50])
+@pytest.mark.exhaustive
+def test_a_run_whose_process_is_killed_is_made_again(level, moods, yawbench, tmp_path):
+    status, _, err = yawbench(moods(10, level, count=2), "out", "--jobs", "1")
+    assert status == 0, err
+    assert (tmp_path / str(level)).exists()  # it was killed
+    assert [row["moment"] for row in rows(tmp_path / "out")] == pytest.approx([1, 1, level / 10, level / 10])
+
+
+def test_more_levels_add_runs_and_repeat_none(moods, yawbench, tmp_path):
+    yawbench(moods(10), "out")
+    assert mentions(yawbench(moods(10, 15), "out")[2], "4 runs", "2", "finished")
+    assert len({entry["key"] for entry in journal(tmp_path / "out")}) == len(journal(tmp_path / "out")) == 4
+    yawbench(moods(10, 15), "anew")
+    assert rows(tmp_path / "out") == rows(tmp_path / "anew")
+
+
+def test_kept_results_can_be_loaded_in_every_format_and_are_made_once(moods, yawbench, tmp_path):
+    file = moods(10)
+    file.write_text(file.read_text() + "keep: none\n")
+    yawbench(file, "out")
+    assert not (tmp_path / "out" / "runs").exists()
+    assert "finished already" not in yawbench(file, "out", "--keep", "--format", "parquet")[2]
+    results = load_results(tmp_path / "out" / "runs" / rows(tmp_path / "out")[1]["key"][:12])
+    assert results.file.name == "results.parquet"
+    assert results["controller.yaw_moment"][-1] == pytest.approx(1.0)
+    assert mentions(yawbench(file, "out", "--keep")[2], "all finished already")
+    more = moods(5, 10)  # what was the first run is the third now
+    assert mentions(yawbench(more, "out", "--keep")[2], "4 runs", "2", "finished")
+    kept = [load_results(tmp_path / "out" / "runs" / row["key"][:12]) for row in rows(tmp_path / "out")]
+    assert [run["controller.yaw_moment"][-1] for run in kept] == pytest.approx([0.5, 0.5, 1.0, 1.0])
+
+
+def kept_levels(folder) -> list[tuple[float, bool]]:
+    """Return the level of each run with results, and whether it completed."""
+    kept = []
+    for row in rows(folder):
+        file = folder / "runs" / row["key"][:12] / "run.json"
+        if file.is_file():
+            kept.append((row["level"], json.loads(file.read_text())["status"] == "completed"))
+    return kept
+
+
+@pytest.mark.parametrize(
+    ("keep", "levels", "expected"),
+    [
+        ("", (1, 2, 20, 45), [2, 20]),  # twenty fails
+        pytest.param(  # the last within the limit, the first beyond
+            "limits", (10, 33, 38, 45), [33, 38], marks=pytest.mark.exhaustive
+        ),
+        pytest.param("all", (10, 33), [10, 33], marks=pytest.mark.exhaustive),
+        ("none", (10, 20), []),
+    ],
+)
+def test_results_are_kept_beside_limits_and_of_failed_runs_or_of_all_or_none(
+    keep, levels, expected, moods, yawbench, tmp_path
+):
+    file = moods(*levels, count=2)
+    file.write_text(file.read_text() + f"keep: {keep}\n" * bool(keep))
+    yawbench(file, "out")
+    found = kept_levels(tmp_path / "out")
+    before = journal(tmp_path / "out")
+    assert sorted({level for level, _ in found}) == expected, found
+    assert len(before) == 2 * len(levels)  # what is made again to keep it is not counted again
+    made = {path: path.stat().st_mtime_ns for path in (tmp_path / "out" / "runs").rglob("run.json")}
+    assert "results to keep" not in yawbench(file, "out")[2]
+    assert {path: path.stat().st_mtime_ns for path in made} == made
+    sides = {path.stem for path in (tmp_path / "out" / "data").glob("*.js")}
+    assert sides <= {row["key"][:12] for row in rows(tmp_path / "out")}
+    if found:
+        missing = next(path for path in made if json.loads(path.read_text())["status"] == "completed")
+        missing.unlink()
+        yawbench(file, "out")
+        assert missing.is_file()
+
+
+def interrupted(file, out, fmus, tmp_path, number):
+    """Start a sweep in a process, stop it by a signal once its slow runs have begun; return its stderr."""
+    os.mkfifo(tmp_path / "slow")
+    command = [sys.executable, "-m", "yawbench", "sweep", str(file), "--out", str(tmp_path / out)]
+    process = subprocess.Popen(
+        [*command, "--fmus", str(fmus), "--jobs", "1"], stderr=subprocess.PIPE, text=True
+    )
+    assert mentions((tmp_path / "slow").read_text(), "it has begun")
+    process.send_signal(number)
+    told = process.communicate()[1]
+    (tmp_path / "slow").unlink()
+    return process.returncode, told
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="needs signals")
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+@pytest.mark.sampled(1)
+def test_a_sweep_that_was_stopped_goes_on_where_it_was(number, moods, yawbench, fmus, tmp_path):
+    file = moods(5, 10, 60, 70)
+    status, told = interrupted(file, "out", fmus, tmp_path, number)
+    assert status == (-number if number == signal.SIGKILL else 128 + number)
+    if number != signal.SIGKILL:
+        assert mentions(told, "out", "results")
+    before = journal(tmp_path / "out")
+    assert len(before) == 4
+    status, _, told = yawbench(file, "out")
+    assert status == 0
+    assert mentions(told, "8 runs", "4", "finished")
+    after = journal(tmp_path / "out")
+    assert after[:4] == before
+    assert len({entry["key"] for entry in after}) == len(after) == 8
+    yawbench(file, "whole")
+    assert (tmp_path / "out" / "table.parquet").read_bytes() == (
+        tmp_path / "whole" / "table.parquet"
+    ).read_bytes()
+
+
+def test_a_folder_of_another_sweep_is_refused(moods, yawbench, tmp_path):
+    file = moods(10)
+    yawbench(file, "out")
+    other = file.with_name("other.yaml")
+    other.write_text(file.read_text())
+    status, _, err = yawbench(other, "out")
+    assert status == 2
+    assert mentions(err, "out", "moods.yaml")
+    assert yawbench(other, "out", "--fresh")[0] == 0
+
+
+def test_a_line_that_a_kill_has_cut_off_is_dropped(tmp_path):
+    first = Journal(tmp_path, "a/b.yaml")
+    first.add("one", MeasuredRun({"x": (float("inf"), "s"), "y": None, "z": (0.1, "m")}))
+    first.add(
+        "two",
+        MeasuredRun(
+            {}, (Diagnostic("run-failed", "plant: step failed"), Diagnostic("run-failed", "and more"))
+        ),
+    )
+    first.add("four", MeasuredRun({"x": None}, (SPIN,), ended="plant: ended the run at t = 1 s"))
+    first.close()
+    with (tmp_path / "runs.jsonl").open("ab") as stream:
+        stream.write(b'{"key": "three", "val')
+    again = Journal(tmp_path, "a/b.yaml")
+    assert again.records == first.records
+    again.add("three", MeasuredRun({"x": (1.0, "s")}))
+    again.close()
+    last = Journal(tmp_path, "a/b.yaml")
+    assert list(last.records) == ["one", "two", "four", "three"]
+    last.close()
+
+
+@pytest.mark.parametrize("head", ["nonsense", '{"sweep": "a/b.yaml", "format": 1}'])
+def test_what_is_no_journal_of_this_version_is_refused_and_kept(head, tmp_path):
+    (tmp_path / "runs.jsonl").write_text(f"{head}\n")
+    with refused(ResultsError, "results-of-another", names=("--out", "--fresh", "version")):
+        Journal(tmp_path, "a/b.yaml")
+    assert (tmp_path / "runs.jsonl").read_text() == f"{head}\n"
+
+
+SPIN = Diagnostic("car-spins", "the car spins", "warning", Location(signal="plant.sideslip", time=1.0), 90.0)
+RECORDS = {
+    "one": MeasuredRun({"slip": (0.0302, "rad"), "moment": (12.0, "N.m")}, (SPIN,), ended="early"),
+    "two": MeasuredRun({"slip": None, "moment": (13.0, "N.m")}, (SPIN,)),
+}
+
+
+def journal_of(folder):
+    made = Journal(folder, "a/b.yaml")
+    for key, record in RECORDS.items():
+        made.add(key, record)
+    made.close()
+    return folder / "runs.jsonl"
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("0.0302", '"7.5"'),
+        ("0.0302", "true"),
+        ("0.0302", "[" * 5000 + "]" * 5000),
+        ('"diagnostics": [{', '"diagnostics": [{"colour": "red", '),
+        ('"key": "one", ', '"key": "one", "findings": ["spin"], '),
+        ('"key": "one"', '"key: "one"'),
+    ],
+)
+def test_the_run_of_a_damaged_line_of_a_journal_is_made_again(old, new, tmp_path):
+    file = journal_of(tmp_path)
+    damaged = file.read_text().replace(old, new, 1)
+    assert damaged != file.read_text()
+    file.write_text(damaged)
+    again = Journal(tmp_path, "a/b.yaml")
+    assert again.records == {"two": RECORDS["two"]}
+    again.add("one", RECORDS["one"])
+    again.close()
+    last = Journal(tmp_path, "a/b.yaml")
+    last.close()
+    assert last.records == RECORDS
+
+
+def test_a_path_that_is_no_utf_8_comes_back_from_the_journal(tmp_path):
+    made = Journal(tmp_path, "a/b.yaml")
+    made.add("one", MeasuredRun({}, (Diagnostic("file-missing", "/home/\udcff: no such file"),)))
+    made.close()
+    again = Journal(tmp_path, "a/b.yaml")
+    again.close()
+    assert again.records == made.records
+
+
+def test_a_sweep_file_that_is_wrong_makes_no_run(moods, yawbench, tmp_path):
+    file = moods(10)
+    file.write_text(file.read_text().replace("controller.level", "controller.levle"))
+    status, _, err = yawbench(file, "out")
+    assert status == 2
+    assert len(err.splitlines()) == 1
+    assert mentions(err, "axes.level", "controller.levle=10")
+    assert not (tmp_path / "out").exists()
+
+
+def page_of(folder) -> html.HtmlElement:
+    return html.fromstring(unpacked(folder / "report.html"))
+
+
+def words_of(element) -> str:
+    return " ".join(" ".join(element.itertext()).split())
+
+
+def test_runs_that_were_never_made_are_not_called_failed(moods, yawbench, tmp_path):
+    file = moods(1, 2, 20)
+    status, out, said = yawbench(file, "out", "--no-run")
+    assert status == 1
+    assert mentions(said, "6 runs")
+    assert "failed" not in out + said
+    assert "failed" not in (tmp_path / "out" / "table.csv").read_text()
+    assert [row["status"] for row in csv.DictReader((tmp_path / "out/table.csv").open())] == ["not made"] * 6
+    assert "unknown (1.00 not made)" in out  # the limit's table: from where on nothing is known
+    assert mentions(words_of(page_of(tmp_path / "out")), "6 runs")
+    page = words_of(page_of(tmp_path / "out").body)
+    assert "failed" not in page
+    assert " ." not in page
+    assert yawbench(file, "out")[0] == 1  # twenty is too much
+    status, out, said = yawbench(file, "out", "--no-run")
+    assert (status, "not made" in out + said) == (1, False)
+    assert "level 20" in said
+    assert "failed: controller" in said
