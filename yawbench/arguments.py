@@ -13,6 +13,7 @@ import math
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from fractions import Fraction
+from itertools import islice
 from pathlib import Path
 from typing import Any, NoReturn, TypeGuard, TypeVar, cast
 
@@ -110,7 +111,7 @@ def names_file(value: object) -> TypeGuard[str | Path]:
 
 
 def items(value: Any, name: str, wanted: str, *, ordered: bool = True) -> list[Any]:
-    """Return the items of an iterable; text, bytes and mappings are refused.
+    """Return the items of an iterable, at most `MOST`: `itertools.count()` never ends; text is refused.
 
     Args:
         value, name: the argument.
@@ -121,7 +122,10 @@ def items(value: Any, name: str, wanted: str, *, ordered: bool = True) -> list[A
     is_single = isinstance(value, np.ndarray) and value.shape == ()
     if isinstance(value, unfit) or is_single or not isinstance(value, Iterable):
         refuse(name, wanted, value)
-    return list(value)
+    entries = list(islice(value, MOST + 1))
+    if len(entries) > MOST:
+        raise ValueError(f"{name}: must have at most {MOST:,} items")
+    return entries
 
 
 def texts(value: Any, name: str, *, ordered: bool = True) -> list[str]:

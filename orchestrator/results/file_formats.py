@@ -217,6 +217,17 @@ def _power(k: int) -> int:
     return -(-(1 << power.bit_length() + 127) // power)
 
 
+def _line(raw: bytes) -> str:
+    """Return a line of a file; one that fills a block has no end.
+
+    Raises:
+        ValueError: it has none.
+    """
+    if len(raw) == BLOCK:
+        raise ValueError(f"a line is longer than {BLOCK} bytes")
+    return raw.decode()
+
+
 class CsvFile:
     """A CSV file: the `names` of its columns, and its rows in blocks.
 
@@ -232,7 +243,7 @@ class CsvFile:
         self._path = path
         try:
             with open_regular(path) as stream:
-                lines = (raw.decode() for raw in iter(lambda: stream.readline(BLOCK), b""))
+                lines = map(_line, iter(lambda: stream.readline(BLOCK), b""))
                 self.names = [name.lstrip("\ufeff") for name in next(csv.reader(lines), [])]
                 self._begin = stream.tell()  # the header may span several lines
         except csv.Error as error:

@@ -361,8 +361,8 @@ def test_every_slider_of_a_shipped_scenario_begins_where_its_run_does(planner, n
     loaded, plan = planned(Job(name, loader.named(name), Path()), planner)
     knobs = {knob.target: knob for knob in knobs_of(loaded, plan)}
     for fact, unit in (("friction", "1"), ("speed", "m/s")):
-        stated = getattr(loaded, fact)
         if fact in knobs:
+            stated = getattr(loaded, fact).value
             assert knobs[fact].value == float(convert(stated, unit) if isinstance(stated, str) else stated)
     shown = shown_first([*knobs.values()], plan)
     settings = [f"{target}={knobs[target].value!r}" for target in shown if target != "friction"]

@@ -193,7 +193,7 @@ def test_a_device_in_place_of_an_fmu_or_a_vehicle_file_is_not_read() -> None:
 def test_a_file_that_is_too_large_is_not_read(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(yaml_lines, "TEXT", 1000)
     (said,) = problems("a" * 1001)
-    assert mentions(said, "a.yaml", "0.001 MB")
+    assert mentions(said, "a.yaml", "1 kB")
 
 
 def test_of_very_many_problems_the_first_ones_are_told() -> None:

@@ -58,8 +58,8 @@ def rank(
         ...     def output(self, t, u):
         ...         return 1e5 * (u.yaw_rate_ref - u.yaw_rate)
         >>> places = yb.rank(Gain, against=["none"], conditions=["saloon75"], quick=True)
-        >>> places.place("Gain"), places.place("none")
-        (1, 2)
+        >>> places.table[["entry", "passed"]].values.tolist()
+        [['Gain', 1], ['none', 0]]
 
     Args:
         controller: name or path of an FMU, or plain Python as in `Scenario.swap`, or a class of such

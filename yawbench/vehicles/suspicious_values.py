@@ -28,11 +28,11 @@ from .derivations import STIFFNESSES, known_car
 from .tir import TyreFile
 
 PLAUSIBLE = {
-    "friction": (0.0, 2.0),  # chosen: above racing tyres on dry asphalt
-    "m/s": (-70.0, 70.0),  # chosen: above the top speed of nearly all cars
-    "rad": (-4.0 * math.pi, 4.0 * math.pi),  # chosen: two turns of a hand wheel
+    "friction": (0.0, 2.0, "%"),  # chosen: above racing tyres on dry asphalt
+    "m/s": (-70.0, 70.0, "km/h"),  # chosen: above the top speed of nearly all cars
+    "rad": (-4.0 * math.pi, 4.0 * math.pi, "deg"),  # chosen: two turns of a hand wheel
 }
-"""Fact or unit -> smallest and largest plausible value. A number with its unit, `324 km/h`, is meant."""
+"""Fact or unit -> smallest and largest plausible value, and the unit that is meant beyond; not `324 km/h`."""
 OF_CAR = (*(name for name, quantity in CAR.items() if quantity.needed), *STIFFNESSES, "steering_ratio")
 """Parameters that describe the car in any instance."""
 IN_FACTS = {name for fact in FACTS.values() for name in (*fact.inputs, *fact.parameters)}
@@ -86,6 +86,7 @@ class _Quantity(NamedTuple):
     written: object  # in the file or the override
     unit: str
     plausible: tuple[float, float] | None
+    meant: str = ""  # unit of values outside it; "": the one that puts them inside
 
 
 def suspicious_values(scenario: LoadedScenario, instances: Mapping[str, Instance]) -> list[Diagnostic]:
@@ -121,7 +122,9 @@ def _beyond(item: _Quantity) -> Diagnostic:
     low, high = item.plausible
     given = number_and_unit(item.written) if isinstance(item.written, str) else None
     number, assumed = given or (f"{item.value:.10g}", item.unit)
-    likely = meant_unit(float(Fraction(number)), assumed, item.unit, lambda value: low <= value <= high)
+    likely = item.meant or meant_unit(
+        float(Fraction(number)), assumed, item.unit, lambda value: low <= value <= high
+    )
     unit = f" {item.unit}" if item.unit != "1" else ""
     says = f"{item.where}: {item.value:.10g}{unit} is implausible (plausible: {low:g} to {high:g}{unit})"
     guess = f"; did you mean '{number} {likely}'?" if likely else ""
@@ -150,10 +153,10 @@ def _of_instances(given: Iterable[GivenValue]) -> Iterator[_Quantity]:
         name, unit = item.name, item.variable.unit or "1"
         if name in FACTS["friction"].inputs:
             name = "friction"
-        plausible = PLAUSIBLE.get(name, PLAUSIBLE.get(unit)) if not item.unit else None
         if name in CAR and unit == CAR[name].unit:
-            plausible = CAR[name].plausible
-        yield _Quantity(item.signal, name, item.value, item.written, unit, plausible)
+            yield _Quantity(item.signal, name, item.value, item.written, unit, CAR[name].plausible)
+        elif not item.unit and (known := PLAUSIBLE.get(name, PLAUSIBLE.get(unit))):
+            yield _Quantity(item.signal, name, item.value, item.written, unit, known[:2], known[2])
 
 
 def _steps(scenario: LoadedScenario, instances: Iterable[Instance]) -> Iterator[Diagnostic]:
