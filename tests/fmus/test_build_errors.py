@@ -178,7 +178,7 @@ def test_a_host_without_a_declared_package_is_told_in_one_sentence(tmp_path, mon
 
 def restart_checker():
     if check._checker is not None:
-        check._end(check._checker)
+        check._checker.close(kill=True)
         check._checker = None
 
 
@@ -365,9 +365,9 @@ def test_a_folder_that_cannot_be_written_is_one_sentence(tmp_path, monkeypatch):
 
 DIES = """
 import os, signal, sys, time
-from fmus import check
+from yawbench.fmus import check
 check.defects(sys.argv[1])
-print(check._checker.pid, flush=True)
+print(check._checker.child.pid, flush=True)
 if os.fork() == 0:
     time.sleep(60)  # with the pipe to the checker
 os.kill(os.getpid(), signal.SIGKILL)

@@ -22,7 +22,7 @@ LAW = '''
 
 from yawbench.components.fmi.component import Component
 
-from tests.orchestrator._gains import GAIN
+from ._gains import GAIN
 
 
 class Follow(Component):
