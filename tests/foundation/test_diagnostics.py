@@ -32,6 +32,7 @@ MAKERS = {
     "_report",
     "_warning",
     "_diagnostics",
+    "Problem",
 }
 """Functions that take a code, beside the errors."""
 NAMES = {"code", "default_code", "DIFFERENCES"}
