@@ -16,7 +16,8 @@ from typing import NamedTuple
 from tests.checkout import ROOT
 from yawbench.foundation.messages import listed
 from yawbench.metrics.verdict import Status, worded
-from yawbench.studies.confidence import Bounds
+from yawbench.studies.axes import OpenValueSpec, OpenVariantSpec, levels_of
+from yawbench.studies.confidence import TAIL, Bounds
 from yawbench.studies.experiment import LoadedExperiment
 from yawbench.studies.load_experiment import found_studies, load_experiment
 from yawbench.studies.result_tables import (
@@ -32,13 +33,15 @@ HEAD = """# Every verdict, and how far it carries
 All claims of the four papers, judged over the values that each of them leaves open. "Holds" and "does not
 reproduce" are robust: with 95 % confidence less than 10 % of the region flips the verdict. If a claim
 "depends on open values", more than 10 % does; if it is "undecided", 128 points do not tell. The confidence
-is that of each claim, not of all together.
+is that of each claim, not of all together: {decided} of {all} are decided, and of so many decisions at most
+{wrong} are expected to be wrong, as each errs to its side with a probability of {tail}.
 
 The margin is how far a number is from the paper's bound at the values that we chose, in per cent of the
 bound: positive where the claim is true there, "by far" beyond 100 %. Where two runs are compared, a
 difference of less than 1 % counts as none, and the margin is what lies beyond. The region gives the number
 of points that flip the verdict, and the 95 % interval of the share; the nearest flip is the one open value
-that changes the verdict first, all others as chosen. [How far a verdict carries](regions.md) explains the
+that changes the verdict first, all others as chosen; a flip between two of the levels that were tried stays
+unseen. [How far a verdict carries](regions.md) explains the
 runs; the ranges of the open values, and the reason for each, are in the study files and in
 `results/report.html`.
 
@@ -101,17 +104,29 @@ def recorded() -> dict[str, list[Row]]:
 
 def page(found: Mapping[str, list[Row]]) -> str:
     """Return the page."""
-    parts = [HEAD, _lines(("study", "claims", *KINDS), summary(found))]
+    rows_of_all = [row for rows in found.values() for row in rows]
+    decided = sum(row.verdict in KINDS[:3] for row in rows_of_all)
+    head = HEAD.format(
+        decided=decided, all=len(rows_of_all), wrong=f"{decided * TAIL:.1f}", tail=f"{100 * TAIL:g} %"
+    )
+    parts = [head, _lines(("study", "claims", *KINDS), summary(found))]
     for title, rows in found.items():
         study = studies()[title]
         region, where = study.spec.region, study.path.relative_to(ROOT)
         assert region
         parts.append(
             f"## {title}\n\n`yawbench study {where}`; {region.points} to {region.most} points over "
-            f"{listed(region.open_values, last='and')}.\n"
+            f"{listed(region.open_values, last='and')}; each alone at "
+            f"{_levels(region.open_values.values())}.\n"
         )
         parts.append(_lines(("the paper says", "verdict", "margin", "region", "nearest flip"), rows))
     return "\n".join(parts)
+
+
+def _levels(open_values: Iterable[OpenValueSpec | OpenVariantSpec]) -> str:
+    """Return at how many levels open values are tried one at a time: `2 to 5 levels`."""
+    numbers = sorted({len(levels_of(one.stepped)) for one in open_values})
+    return f"{numbers[0]} to {numbers[-1]} levels" if len(numbers) > 1 else f"{numbers[0]} levels"
 
 
 def summary(found: Mapping[str, list[Row]]) -> list[tuple[str, ...]]:

@@ -242,7 +242,7 @@ def region_words(judgement: ClaimResult) -> list[str]:
     ]
 
 
-NO_FLIP = "no flip along any open value"
+NO_FLIP = "no flip at any level tried"
 
 
 def share_words(flipping: int, points: int, bounds: Bounds, without_result: int = 0) -> str:
