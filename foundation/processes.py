@@ -342,24 +342,31 @@ class Channel:
             while rest:
                 rest = rest[os.write(self.writing, rest) :]
 
-    def receive(self) -> tuple[str, Any]:
-        """Return kind and content of the next record; raise `EOFError` if the other side is gone."""
-        size = int.from_bytes(self._read(_HEAD), "little")
+    def receive(self, ready: Callable[[], None] = lambda: None) -> tuple[str, Any]:
+        """Return kind and content of the next record.
+
+        Args:
+            ready: called before each part is read; returns when there is something to read.
+
+        Raises:
+            EOFError: the other side is gone.
+        """
+        size = int.from_bytes(self._read(_HEAD, ready), "little")
         if size > self._longest:
             raise ValueError(f"a record of {size} bytes")
-        kind, content = pickle.loads(self._read(size))
+        kind, content = pickle.loads(self._read(size, ready))
         return kind, content
 
-    def _read(self, size: int) -> bytes:
-        data = os.read(self.reading, min(size, _PART))
-        if len(data) == size:
-            return data
-        read = bytearray(data)
-        while data and len(read) < size:
+    def _read(self, size: int, ready: Callable[[], None]) -> bytes:
+        read = bytearray()
+        while len(read) < size:
+            ready()
             data = os.read(self.reading, min(size - len(read), _PART))
+            if len(data) == size:
+                return data
+            if not data:
+                raise EOFError
             read += data
-        if len(read) < size:
-            raise EOFError
         return bytes(read)
 
     def close(self) -> None:
@@ -432,19 +439,24 @@ class Process:
     def hear(self, wanted: str) -> Any:
         """Handle incoming records until one of the wanted kind arrives, and return its content."""
         while True:
-            while not self._poll.poll(LOOK_EVERY):
-                self.check_time()
-                if self.child.ended() and not self._poll.poll(0):
-                    raise self._gone("")  # a process started by an FMU keeps the pipe open
             try:
-                kind, content = self._channel.receive()
+                kind, content = self._channel.receive(self._await)
                 handle = None if kind == wanted else self._unasked[kind]
+            except ProcessLost:
+                raise
             except Exception as error:
                 raise self._gone(f"{type(error).__name__}: {error}") from None
             if handle is None:
                 return content
             handle(*content)
             self.check_time()
+
+    def _await(self) -> None:
+        """Wait for something to read; an FMU may write half a record and no more."""
+        while not self._poll.poll(LOOK_EVERY):
+            self.check_time()
+            if self.child.ended() and not self._poll.poll(0):
+                raise self._gone("")  # a process started by an FMU keeps the pipe open
 
     def _gone(self, error: str) -> ProcessLost:
         """Return the exception for a process that has ended, or has sent something that is not an answer."""
