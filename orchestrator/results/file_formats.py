@@ -1,4 +1,4 @@
-"""File formats of recorded results: names, recorders, readers, expected sizes; and CSV, the default format.
+"""Formats of result files: how rows of CSV are written and read; names and sizes of all formats.
 
 CSV is written and read in blocks of rows: a long run needs no more memory than the rows kept. `rows_text`
 writes numbers as Python's `repr` does, and reading them gives the same bits. A function in C does it in a

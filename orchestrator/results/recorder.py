@@ -1,4 +1,4 @@
-"""Recorders: of results.csv and run.json, in memory, and the base classes of those of other formats.
+"""Recorders: take the rows of a run, put results and record in place; the base of those of every format.
 
 Both files are written under temporary names and renamed together at the end (see `run_folder`), so a
 folder has either the earlier results or the new ones; the folder is locked while a run writes. Rows are

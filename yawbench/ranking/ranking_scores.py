@@ -1,4 +1,4 @@
-"""Scores of a ranking: judged runs, controllers under conditions, and the order of the controllers.
+"""Scores of a ranking: judged runs, controllers under conditions, their order (tests: `studies.confidence`).
 
 A run passes if the regulation's criteria are met and the sideslip stays below 20 degrees, beyond which a car
 turns round though its yaw-rate ratio may meet them. A condition is passed if all of its runs pass.

@@ -1,4 +1,4 @@
-"""Scores of entries over threats and cars, how sure they are, and who can be told apart.
+"""Scores of entries over threats and cars, with their intervals and places (tests: `studies.confidence`).
 
 Positions are an array of entry, threat and car: where between its easy end (0) and its hard end (1) each
 level survived lies on a geometric scale; NaN where a car does not drive a threat. The mean position is the

@@ -1,4 +1,4 @@
-"""Limits of axes: up to which value all conditions hold, for each setting of the other axes."""
+"""Limits of axes: up to which value all conditions hold; which runs `keep: limits` keeps."""
 
 from __future__ import annotations
 

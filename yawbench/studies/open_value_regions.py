@@ -1,4 +1,4 @@
-"""Regions: claims judged again over the values that a paper leaves open, and the runs this needs.
+"""Regions: claims judged again over open values, and the runs this needs (bounds of a verdict: `claims`).
 
 The runs keep no results. At the chosen point the named runs themselves are used.
 """
