@@ -253,13 +253,27 @@ if hasattr(os, "register_at_fork"):
 def main(descriptor: str) -> None:
     """Serve the process at the other end of a socket until it ends; then end all children."""
     children: dict[int, Connection] = {}  # process id -> where its return code is told
-    signal.signal(signal.SIGCHLD, lambda number, frame: _tell_ends(children))
+    ends, woken = os.pipe()  # a handler alone may run after a call that then waits for ever
+    for end_of_pipe in (ends, woken):
+        os.set_blocking(end_of_pipe, False)
+    signal.set_wakeup_fd(woken, warn_on_full_buffer=False)
+    signal.signal(signal.SIGCHLD, lambda number, frame: None)
     gc.set_threshold(GARBAGE, 20, 20)
     with contextlib.suppress(KeyboardInterrupt, OSError, EOFError):
         asking = socket.socket(fileno=int(descriptor))
         requests = Connection(os.dup(asking.fileno()))
-        while shared := socket.recv_fds(asking, 1, _PASSED)[1]:
-            _serve(children, requests.recv(), shared)
+        waiting = select.poll()
+        waiting.register(asking, select.POLLIN)
+        waiting.register(ends, select.POLLIN)
+        while True:
+            ready = {number for number, _ in waiting.poll()}
+            if ends in ready:
+                os.read(ends, _PART)
+                _tell_ends(children)
+            if asking.fileno() in ready:
+                if not (shared := socket.recv_fds(asking, 1, _PASSED)[1]):
+                    break
+                _serve(children, requests.recv(), shared)
     for number, within in ((signal.SIGTERM, GRACE), (signal.SIGKILL, CLOSING)):
         for child in [*children]:
             with contextlib.suppress(OSError):
@@ -267,6 +281,7 @@ def main(descriptor: str) -> None:
         end = time.monotonic() + within
         while children and time.monotonic() < end:
             time.sleep(0.001)
+            _tell_ends(children)
     os._exit(0)
 
 
@@ -279,12 +294,10 @@ def _serve(children: dict[int, Connection], request: Request, shared: Sequence[i
     for descriptor in shared:
         os.set_inheritable(descriptor, False)
     status, *passed = shared
-    signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGCHLD])  # until its end can be told
     child = fork(partial(_become, request, passed), passed, ends_by=signal.SIGTERM)
     children[child] = Connection(status, readable=False)
     with contextlib.suppress(BrokenPipeError):
         children[child].send(child)
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGCHLD])
     for descriptor in passed:
         os.close(descriptor)
 
@@ -302,8 +315,8 @@ def _tell_ends(children: dict[int, Connection]) -> None:
 
 def _become(request: Request, shared: Sequence[int]) -> None:
     """Answer calls in a copy of the server, with what belongs to the process that asked for it."""
+    signal.set_wakeup_fd(-1)
     signal.signal(signal.SIGCHLD, signal.SIG_DFL)
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGCHLD])
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # for the process that asked, which ends this one
     *output, commands, answers = shared
     for place, descriptor in zip((1, 2), output, strict=True):
