@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.checkout import ROOT
 from tests.orchestrator.recorded import car, noted, write
 from tests.refusals import each_mentions, mentions
 from tests.reports.browser import DESK, PHONE, Browser
@@ -23,6 +24,7 @@ from yawbench.foundation.errors import ResultsError
 from yawbench.orchestrator.results.measurement_results import MeasuredResults
 from yawbench.orchestrator.results.reader import Results
 from yawbench.orchestrator.results.run_record import RunRecord
+from yawbench.reports.page_parts import without_comments
 from yawbench.reports.viewer import (
     MOST,
     PANELS,
@@ -756,6 +758,41 @@ def test_print_is_finer_and_shows_no_controls(chromium, two):
     }
     assert shown["bar"] == shown["time"] == "none"
     assert "none" not in (shown["scene"], shown["panels"], shown["runs"])
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_lines_stand_out_from_the_ground_in_light_and_dark(chromium, two, scheme):
+    chromium.driver.execute_cdp_cmd(
+        "Emulation.setEmulatedMedia", {"features": [{"name": "prefers-color-scheme", "value": scheme}]}
+    )
+    chromium.driver.get(two.resolve().as_uri())
+    chromium.wait_for("document.querySelector('.yv-ready')")
+    theme = chromium.run(VIEWER + "return viewer.theme")
+    for colour in (*theme["runs"], theme["ink"], theme["quiet"]):
+        wanted = 4.5 if colour in (theme["ink"], theme["quiet"]) else 2.1  # Okabe and Ito's sky blue on white
+        assert contrast(colour, theme["ground"]) >= wanted, (scheme, colour)
+
+
+def contrast(one: str, other: str) -> float:
+    """Return the contrast ratio of two colours `#rgb` or `#rrggbb` (WCAG 2.2)."""
+
+    def luminance(colour: str) -> float:
+        digits = colour.lstrip("#")
+        pairs = [2 * d for d in digits] if len(digits) == 3 else [digits[k : k + 2] for k in (0, 2, 4)]
+        parts = [int(pair, 16) / 255 for pair in pairs]
+        linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in parts]
+        return float(np.dot(linear, [0.2126, 0.7152, 0.0722]))
+
+    low, high = sorted([luminance(one), luminance(other)])
+    return (high + 0.05) / (low + 0.05)
+
+
+def test_scripts_lose_comments_and_indentation_alone():
+    script = "  // why\n\n  let a = 'b // c';  // d\n/* e */\n"
+    assert without_comments(script) == "let a = 'b // c';\n/* e */\n"
+    for file in (ROOT / "yawbench").glob("*/static/*.js"):
+        for line in file.read_text(encoding="utf-8").splitlines():
+            assert line.count("`") % 2 == 0  # no text goes over several lines
 
 
 def test_a_viewer_that_was_removed_writes_nothing_into_the_address(chromium: Browser, two):
