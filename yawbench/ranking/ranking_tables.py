@@ -76,11 +76,11 @@ def apart_sentence(apart: ToldApart, idle: Sequence[bool]) -> str:
         apart: the comparison of all pairs.
         idle: which entries are no control.
     """
-    number, controllers = len(idle), [k for k, without in enumerate(idle) if not without]
-    if number < 2:
+    if len(idle) < 2:
         return ""
-    better = apart.better[:, [k for k in range(number) if idle[k]]].any(axis=1).sum()
-    between = apart.better[np.ix_(controllers, controllers)].sum()
+    controllers = [k for k, without in enumerate(idle) if not without]
+    among = apart.of(controllers)
+    better = apart.better[:, np.asarray(idle)].any(axis=1).sum()
     than_none = (
         f"{better} of {counted(len(controllers), 'controller')} are clearly better than no control. "
         if any(idle)
@@ -89,9 +89,9 @@ def apart_sentence(apart: ToldApart, idle: Sequence[bool]) -> str:
     if len(controllers) < 2:
         return than_none.strip()
     return (
-        f"{than_none}Of two controllers one is clearly better in {between} of "
+        f"{than_none}Of two controllers one is clearly better in {among.better.sum()} of "
         f"{counted(math.comb(len(controllers), 2), 'pair')}, corrected for their number; each pair taken "
-        f"alone, it would be in {apart.of(controllers).alone.sum()}."
+        f"alone, it would be in {among.alone.sum()}."
     )
 
 
