@@ -110,6 +110,7 @@ FLAWS = ("_noise", "_bias", "_drift")
 
 ROUNDED = dict.fromkeys(("controller_fnn", "controller_fuzzy_feedback", "controller_fuzzy_sideslip"), 1e-6)
 """Largest loss in a mirror [N.m]: sums over fuzzy sets run from left to right; else not a bit."""
+ROUNDED |= {"allocator_weighted_least_squares": 1e-6}  # [N]; an elimination begins at the left wheels
 
 SPLIT = {
     **dict.fromkeys(("plant_seven_dof", "plant_two_dof"), 1e-4),
