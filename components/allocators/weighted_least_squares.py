@@ -1,20 +1,21 @@
 """Yaw-moment allocation by weighted least squares within the force that each tyre can give.
 
-    minimize  sum_i ((F_i - F_d,i) / (mu F_zi))^2  +  gamma ((M(F) - M_z - M_d) / m_0)^2  +  gamma_x ((X(F) - X_d) / f_0)^2
+    minimize    sum_i ((F_i - F_d,i) / (mu F_zi))^2
+                + gamma ((M(F) - M_z - M_d) / m_0)^2 + gamma_x ((X(F) - X_d) / f_0)^2
     subject to  -mu F_zi <= F_i <= highest,     M(F) = sum(F_i arm_i),     X(F) = sum(F_i)
 
-with the driver's forces F_d (equal left and right, `control_laws.allocator`), their sum X_d and their moment M_d,
-m_0 = mu m g d/2 and f_0 = mu m g. gamma is large, so the moment is missed only if the tyres cannot give it; then
-it is the nearest one. A wheel uses its grip in proportion to its load, so unloaded wheels do not lock. `highest` is
-zero with brakes, where a car slows in exchange for its moment (gamma_x small), and +mu F_zi with motors. Lateral
-forces are left out: wheels at their grip are for the slip control.
+with the driver's forces F_d (equal left and right, `control_laws.allocator`), their sum X_d and their moment
+M_d, m_0 = mu m g d/2 and f_0 = mu m g. gamma is large, so the moment is missed only if the tyres cannot give
+it; then it is the nearest one. A wheel uses its grip in proportion to its load, so unloaded wheels do not
+lock. `highest` is zero with brakes, where a car slows in exchange for its moment (gamma_x small), and +mu
+F_zi with motors. Lateral forces are left out: wheels at their grip are for the slip control.
 
-Source: O. Haerkegaard, 2002 (`mathematics.bounded_least_squares`), where actuators are control surfaces; T. A.
-Johansen, T. I. Fossen, Control allocation: a survey, Automatica 49(5), 2013, 1087-1103. For cars, P. Toendel,
-T. A. Johansen, Control allocation for yaw stabilization in automotive vehicles using multiparametric nonlinear
-programming, American Control Conference, 2005, with the same aim, smallest use of tyres for a moment, and
-J. Wang, R. G. Longoria, IEEE TCST 17(3), 2009. The last three were not read. Ours differs: longitudinal forces
-alone; without weights of wheels, since all tyres are alike.
+Source: O. Haerkegaard, 2002 (`mathematics.bounded_least_squares`), where actuators are control surfaces; T.
+A. Johansen, T. I. Fossen, Control allocation: a survey, Automatica 49(5), 2013, 1087-1103. For cars, P.
+Toendel, T. A. Johansen, Control allocation for yaw stabilization in automotive vehicles using multiparametric
+nonlinear programming, American Control Conference, 2005, with the same aim, smallest use of tyres for a
+moment, and J. Wang, R. G. Longoria, IEEE TCST 17(3), 2009. The last three were not read. Ours differs:
+longitudinal forces alone; without weights of wheels, since all tyres are alike.
 """
 
 from dataclasses import dataclass

@@ -2,16 +2,17 @@
 
     minimize sum_i w_i (x_i - d_i)^2 + sum_k v_k (B_k x - c_k)^2      subject to      low <= x <= high
 
-Some elements of x are held at a bound, the others minimize the cost. If they leave their bounds, x moves towards
-that minimum until the first of them meets its bound, which is held from then on. Else, of the held elements whose
-release would lower the cost, the one with the steepest slope is released; without any, x is the solution. With
-w_i > 0 the cost is strictly convex, so the solution is unique and found in finitely many steps.
+Some elements of x are held at a bound, the others minimize the cost. If they leave their bounds, x moves
+towards that minimum until the first of them meets its bound, which is held from then on. Else, of the held
+elements whose release would lower the cost, the one with the steepest slope is released; without any, x is
+the solution. With w_i > 0 the cost is strictly convex, so the solution is unique and found in finitely many
+steps.
 
-Source: O. Haerkegaard, Efficient active set algorithms for solving constrained least squares problems in aircraft
-control allocation, 41st IEEE Conference on Decision and Control, 2002 (report LiTH-ISY-R-2426; its abstract and
-introduction were read), the formulation `WLS` of his toolbox QCAT; J. Nocedal, S. J. Wright, Numerical
-Optimization, 2nd edition, algorithm 16.3. Ours differs: normal equations in place of a QR factorization, which
-suffices for a few unknowns of comparable weights.
+Source: O. Haerkegaard, Efficient active set algorithms for solving constrained least squares problems in
+aircraft control allocation, 41st IEEE Conference on Decision and Control, 2002 (report LiTH-ISY-R-2426; its
+abstract and introduction were read), the formulation `WLS` of his toolbox QCAT; J. Nocedal, S. J. Wright,
+Numerical Optimization, 2nd edition, algorithm 16.3. Ours differs: normal equations in place of a QR
+factorization, which suffices for a few unknowns of comparable weights.
 """
 
 from array import array

@@ -1,20 +1,20 @@
-"""Superposition steering: an actuator adds an angle to the driver's, with dead time, lag, rate and range limit.
+"""Superposition steering: an actuator adds an angle to the driver's, with dead time, lag and limits.
 
     delta   = delta_driver + delta_a
     tau d(delta_a)/dt = delta_a*(t - delay) - delta_a,     |d(delta_a)/dt| <= rate_limit
     delta_a* = request limited to +-range
 
-All angles are those of the road wheels. The driver's angle passes without delay, since the mechanical link stays:
-a planetary gear adds the angle of an electric motor to the angle of the hand wheel. Without a request the
-outputs are the driver's angle to the last bit. References see the driver's angle, plants the total one: a scenario
-connects `total_steer_angle` to `plant.steer_angle`. Delay and lag are exact for any step size
+All angles are those of the road wheels. The driver's angle passes without delay, since the mechanical link
+stays: a planetary gear adds the angle of an electric motor to the angle of the hand wheel. Without a request
+the outputs are the driver's angle to the last bit. References see the driver's angle, plants the total one: a
+scenario connects `total_steer_angle` to `plant.steer_angle`. Delay and lag are exact for any step size
 (`mathematics.first_order_lag`).
 
-Source: the principle, W. Klier, G. Reimann, W. Reinelt, Concept and functionality of the active front steering
-system, SAE 2004-21-0073, 2004, of which the abstract and the beginning were read. P. Koehn, M. Eckrich, Active
-steering, SAE 2004-01-1105, and W. Klier, W. Reinelt, SAE 2004-01-1102 (eight bodies and a synchronous motor), were
-not read in full, and what was read of them prints no figures: limits and lag are chosen. Ours differs: the gear is
-rigid, the torque at the hand wheel is not modelled.
+Source: the principle, W. Klier, G. Reimann, W. Reinelt, Concept and functionality of the active front
+steering system, SAE 2004-21-0073, 2004, of which the abstract and the beginning were read. P. Koehn, M.
+Eckrich, Active steering, SAE 2004-01-1105, and W. Klier, W. Reinelt, SAE 2004-01-1102 (eight bodies and a
+synchronous motor), were not read in full, and what was read of them prints no figures: limits and lag are
+chosen. Ours differs: the gear is rigid, the torque at the hand wheel is not modelled.
 """
 
 from dataclasses import dataclass

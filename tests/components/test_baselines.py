@@ -12,9 +12,10 @@ from scipy.optimize import nnls
 
 from yawbench.components.cars.single_track_car import SingleTrackCar
 from yawbench.components.control_laws.linear_feedback import error_dynamics, optimal_gains
+from yawbench.components.control_laws.phase_plane import beyond
 from yawbench.components.control_laws.predictive_law import CostWeights, PredictiveLaw, _discrete
 from yawbench.components.control_laws.sideslip_bound import sideslip_bound
-from yawbench.components.controllers.dead_band import DeadBand, beyond
+from yawbench.components.controllers.dead_band import DeadBand
 from yawbench.components.controllers.lqr import Lqr
 from yawbench.components.controllers.mpc import Mpc
 from yawbench.components.mathematics.quadratic_program import inverse, multipliers

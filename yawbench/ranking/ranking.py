@@ -15,8 +15,8 @@
     more_entries: [tuned.yaml]         # files of entries alone
 
 A condition overrides its scenario like a run of a study. An entry swaps its FMU in for the instance
-`controller` and sets its parameters, the same in all conditions; what belongs to it beside the controller, such as
-an allocator, it swaps in too (`swap`).
+`controller` and sets its parameters, the same in all conditions; `swap` swaps in what belongs to it beside
+the controller, such as an allocator.
 
 A ranking is two experiments. The first determines the steering angle A of every car, on a dry road without
 control, so that all controllers drive the same amplitudes. In the second, conditions are named runs; entry,
