@@ -1,6 +1,6 @@
-"""The gains of `components/controllers/gain_scheduled.py`, printed by `python -m docs.generate.gain_scheduled`.
+"""The gains of `components/controllers/gain_scheduled.py`: `python -m docs.generate.gain_scheduled`.
 
-They solve linear matrix inequalities for one Lyapunov function, at both ends of the schedule and several speeds.
+They solve linear matrix inequalities for one Lyapunov function, at both ends of the schedule and at some speeds.
 The semidefinite programs need the extra `synthesis`.
 """
 
@@ -24,7 +24,7 @@ SIDESLIP, YAW_RATE, TURNED = 0.05, 0.1, 0.05
 STEERED = 0.035
 """Added steer angle [rad] of that weight. Chosen: half of the actuator's range."""
 MOMENTS = 100.0, 10000.0
-"""Moment [N.m] of that weight where the car is stable, and at the limit. Chosen: hardly any; the brakes' most."""
+"""Moment [N.m] of that weight where the car is stable, and at the limit. Chosen: hardly any; the most."""
 DISTURBED = 1.0, 1.0
 """Disturbances of both errors' rates [rad/s, rad/s2] of equal size. Chosen: those of a fast lane change."""
 
