@@ -108,7 +108,7 @@ class EntrySpec(StrictModel):
     parameters: dict[str, Scalar] = Field(
         {}, description="Parameter, or step_size, -> value; default: those of the FMU"
     )
-    swap: dict[str, str] = Field({}, description="Other instance -> FMU that belongs to this entry")
+    swap: dict[str, str] = Field(default={}, description="Other instance -> FMU that belongs to this entry")
     source: str = Field(min_length=1, description="Source of the controller and its gains")
     gains: Literal["authors", "tuned"] = Field("authors", description="Who chose the gains")
 
