@@ -1,6 +1,6 @@
 """The gains of `components/controllers/gain_scheduled.py`: `python -m docs.generate.gain_scheduled`.
 
-They solve linear matrix inequalities for one Lyapunov function, at both ends of the schedule and at all speeds.
+They solve linear matrix inequalities for one Lyapunov function, at both ends of the schedule and all speeds.
 The semidefinite programs need the extra `synthesis`.
 """
 
