@@ -25,6 +25,7 @@ ROLES: dict[str, Role] = {
     "allocators": Role("allocator", inputs=("yaw_moment",), outputs=("force_request_*",)),
     "wheel_controls": Role("wheel_control", inputs=("force_request_*",), outputs=("torque_request_*",)),
     "actuators": Role("actuator", inputs=("torque_request_*",), outputs=("wheel_torque_*",)),
+    "steering_actuators": Role("steering_actuator", inputs=("steer_angle",), outputs=("total_steer_angle",)),
     "plants": Role(
         "plant",
         inputs=("steer_angle", "tyre_force_x_*", "tyre_force_y_*"),

@@ -93,6 +93,13 @@ SIGNALS: dict[str, SignalEntry] = {
         "δ",
         largest=1.05,  # 60 degrees, above the lock of all cars
     ),
+    "added_steer_angle_request": SignalEntry(
+        "rad", "Requested angle that steering adds to the driver's", "δ_a*"
+    ),
+    "added_steer_angle": SignalEntry("rad", "Angle that steering adds to the driver's", "δ_a"),
+    "total_steer_angle": SignalEntry(
+        "rad", "Road-wheel steer angle, the driver's and the added one", "δ_total"
+    ),
     "steering_wheel_angle": SignalEntry(
         "rad",
         "Hand-wheel angle",

@@ -20,14 +20,13 @@ _ORDER = 14
 """Order of the series of the matrix exponential, exact to rounding for |A h| <= 1."""
 
 
-def _discrete(a: Matrix, b: float, h: float) -> tuple[Matrix, tuple[float, float]]:
+def discrete(a: Matrix, b: float, h: float) -> tuple[Matrix, tuple[float, float]]:
     """Return the transition matrix over `h` [s] and the response to a held unit input on the second state."""
     (a_11, a_12), (a_21, a_22) = a
-    if h * max(abs(a_11) + abs(a_12), abs(a_21) + abs(a_22)) > 1.0:  # slow convergence: take two halves
-        half, (g_1, g_2) = _discrete(a, b, 0.5 * h)
-        more_1, more_2 = _stepped(half, (g_1, g_2))
-        (p_11, p_21), (p_12, p_22) = (_stepped(half, (row[0], row[1])) for row in zip(*half, strict=True))
-        return ((p_11, p_12), (p_21, p_22)), (g_1 + more_1, g_2 + more_2)
+    doublings = 0
+    while h * max(abs(a_11) + abs(a_12), abs(a_21) + abs(a_22)) > 1.0:  # the series would converge slowly
+        h *= 0.5
+        doublings += 1
     p_11, p_12, p_21, p_22 = 1.0, 0.0, 0.0, 1.0
     t_11, t_12, t_21, t_22 = 1.0, 0.0, 0.0, 1.0  # (A h)^k / k!
     g_1, g_2 = 0.0, h * b
@@ -42,6 +41,11 @@ def _discrete(a: Matrix, b: float, h: float) -> tuple[Matrix, tuple[float, float
         p_11, p_12, p_21, p_22 = p_11 + t_11, p_12 + t_12, p_21 + t_21, p_22 + t_22
         g_1 += t_12 * h / (k + 1) * b
         g_2 += t_22 * h / (k + 1) * b
+    for _ in range(doublings):
+        half = (p_11, p_12), (p_21, p_22)
+        more_1, more_2 = _stepped(half, (g_1, g_2))
+        g_1, g_2 = g_1 + more_1, g_2 + more_2
+        (p_11, p_21), (p_12, p_22) = _stepped(half, (p_11, p_21)), _stepped(half, (p_12, p_22))
     return ((p_11, p_12), (p_21, p_22)), (g_1, g_2)
 
 
@@ -63,7 +67,7 @@ class PredictiveLaw:
 
     def __init__(self, dynamics: Matrix, i_z: float, w: CostWeights) -> None:
         n = w.moves
-        phi, gamma = _discrete(dynamics, w.moment_0 / i_z, w.step)
+        phi, gamma = discrete(dynamics, w.moment_0 / i_z, w.step)
         free = [(1.0, 0.0), (0.0, 1.0)]  # e at the step for e_0 = (1, 0) and (0, 1)
         forced = [(0.0, 0.0)] * n  # and for each moment, in units of M_0
         hessian = [[0.0] * n for _ in range(n)]

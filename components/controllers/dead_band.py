@@ -18,6 +18,7 @@ Bosch's controller outputs slip targets itself.
 from dataclasses import dataclass
 
 from ..control_laws.moment_limit import LimitParameters
+from ..control_laws.phase_plane import beyond
 from ..control_laws.sideslip_bound import sideslip_bound
 from ..fmi.component import Component
 from ..fmi.variables import like, output, parameter, signal
@@ -49,11 +50,6 @@ class DeadBandParameters:
     full_speed: float = parameter(
         8.0, "m/s", "Speed from which the moment is full", "chosen: twice that", minimum=0.001
     )
-
-
-def beyond(value: float, threshold: float) -> float:
-    """Return the excess of `value` over +-`threshold`, with its sign."""
-    return value - threshold if value > threshold else value + threshold if value < -threshold else 0.0
 
 
 class DeadBand(Component):

@@ -112,9 +112,20 @@ def monitor(ax: Axes) -> None:
     ax.add_patch(Circle((0.55, 0.55), 0.25, fc=ACCENT, ec="none"))
 
 
+def steering_actuator(ax: Axes) -> None:
+    for angle, color in ((0.0, INK), (0.45, ACCENT)):
+        ax.plot(
+            [-0.7 * np.sin(angle), 0.7 * np.sin(angle)],
+            [-0.7 * np.cos(angle), 0.7 * np.cos(angle)],
+            color,
+            lw=9,
+        )
+    _arrow(ax, 0.05, 0.85, 0.35, -0.08)
+
+
 ROLES: tuple[Callable[[Axes], None], ...] = (
     driver, reference, controller, allocator, wheel_control, actuator, plant, tyre, road, sensor, estimator,
-    monitor,
+    monitor, steering_actuator,
 )  # fmt: skip
 
 

@@ -12,9 +12,10 @@ from scipy.optimize import nnls
 
 from yawbench.components.cars.single_track_car import SingleTrackCar
 from yawbench.components.control_laws.linear_feedback import error_dynamics, optimal_gains
-from yawbench.components.control_laws.predictive_law import CostWeights, PredictiveLaw, _discrete
+from yawbench.components.control_laws.phase_plane import beyond
+from yawbench.components.control_laws.predictive_law import CostWeights, PredictiveLaw, discrete
 from yawbench.components.control_laws.sideslip_bound import sideslip_bound
-from yawbench.components.controllers.dead_band import DeadBand, beyond
+from yawbench.components.controllers.dead_band import DeadBand
 from yawbench.components.controllers.lqr import Lqr
 from yawbench.components.controllers.mpc import Mpc
 from yawbench.components.mathematics.quadratic_program import inverse, multipliers
@@ -51,7 +52,7 @@ def test_gains_stay_finite_where_the_yaw_rate_does_not_reach_the_sideslip():
 @pytest.mark.parametrize("speed", [25.0, 0.5])  # the slow car is stiff
 def test_the_discrete_model_is_that_of_the_matrix_exponential(speed):
     a = np.array(error_dynamics(CARS["oversteering"], speed))
-    phi, gamma = _discrete(tuple(map(tuple, a)), 3.0, 0.02)
+    phi, gamma = discrete(tuple(map(tuple, a)), 3.0, 0.02)
     whole = expm(np.vstack([np.column_stack([a, [0.0, 3.0]]), np.zeros(3)]) * 0.02)
     assert np.allclose(phi, whole[:2, :2], rtol=1e-13, atol=1e-15 if speed == 25.0 else 1e-10)
     assert np.allclose(gamma, whole[:2, 2], rtol=1e-12, atol=1e-15 if speed == 25.0 else 1e-10)
@@ -82,7 +83,7 @@ def test_far_from_limits_a_long_prediction_is_the_regulator_of_the_sampled_car(c
     a, step = error_dynamics(car, 25.0), 0.05
     weights = CostWeights(**SCALES, penalty=1.0, step=step, moves=45, steps_per_move=1)
     law = PredictiveLaw(a, car.i_z, weights)
-    phi, gamma = _discrete(a, weights.moment_0 / car.i_z, step)
+    phi, gamma = discrete(a, weights.moment_0 / car.i_z, step)
     b = np.array(gamma).reshape(2, 1)
     q = np.diag([SCALES["beta_0"] ** -2, SCALES["r_0"] ** -2])
     p = solve_discrete_are(phi, b, q, [[1.0]])
@@ -96,7 +97,7 @@ def test_the_moments_of_the_program_are_the_best_that_are_allowed():
     car = CARS["understeering"]
     w = CostWeights(**SCALES, penalty=10.0, step=0.02, moves=2, steps_per_move=5)
     a, b = error_dynamics(car, 25.0), w.moment_0 / car.i_z
-    phi, gamma = map(np.array, _discrete(a, b, w.step))
+    phi, gamma = map(np.array, discrete(a, b, w.step))
     most, bound, beta_ref = 3000.0, 0.05, 0.01
 
     grid = np.linspace(-most, most, 121) / w.moment_0

@@ -84,6 +84,7 @@ ODD = {
     "steering_wheel_angle_measured",
     *("velocity_y", "yaw_rate", "sideslip", "sideslip_rate", "acceleration_y", "roll_angle", "roll_rate"),
     *("position_y", "yaw_angle", "steer_angle", "steering_wheel_angle", "yaw_rate_ref", "sideslip_ref"),
+    *("added_steer_angle_request", "added_steer_angle", "total_steer_angle"),
     *("yaw_acceleration_ref", "sideslip_rate_ref", "yaw_moment", "path_offset"),
     *("sliding_surface", "learning_error", "integral_term", "yaw_rate_part", "sideslip_part"),
     *wheels("tyre_force_y_*"),
@@ -109,6 +110,7 @@ FLAWS = ("_noise", "_bias", "_drift")
 
 ROUNDED = dict.fromkeys(("controller_fnn", "controller_fuzzy_feedback", "controller_fuzzy_sideslip"), 1e-6)
 """Largest loss in a mirror [N.m]: sums over fuzzy sets run from left to right; else not a bit."""
+ROUNDED |= {"allocator_weighted_least_squares": 1e-6}  # [N]; an elimination begins at the left wheels
 
 SPLIT = {
     **dict.fromkeys(("plant_seven_dof", "plant_two_dof"), 1e-4),

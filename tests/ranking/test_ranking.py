@@ -11,8 +11,8 @@ import pytest
 
 from tests.command_line import status_of
 from tests.refusals import mentions
-from yawbench.foundation.errors import Diagnostic
-from yawbench.ranking.ranking import EntrySpec
+from yawbench.foundation.errors import Diagnostic, ScenarioError
+from yawbench.ranking.ranking import EntrySpec, load_ranking
 from yawbench.ranking.ranking_scores import (
     UNHELD,
     WORST,
@@ -101,6 +101,20 @@ def test_entries_that_no_exact_test_tells_apart_share_a_place():
     assert ranked[0].bounds == pytest.approx([12 * x for x in share_bounds(9, 12)])
     apart = apart_by_conditions(ranked)
     assert (apart.better.sum(), apart.alone.sum()) == (4, 4)  # neither nine and eight nor one and none
+
+
+def test_an_entry_brings_units_beside_its_controller_and_names_that_one_by_its_own_key(tmp_path):
+    text = "{title: x, fmu: controller_lqr, swap: {allocator: mine.fmu}, source: y}"
+    file, other = tmp_path / "ranking.yaml", tmp_path / "folder" / "more.yaml"
+    other.parent.mkdir()
+    other.write_text(f"entries: {{wls: {text}}}")
+    file.write_text(SMALL + "\nmore_entries: [folder/more.yaml]\n")
+    variant = load_ranking(file).variant("wls")
+    assert variant.swap == {"controller": "controller_lqr", "allocator": str(other.parent / "mine.fmu")}
+    other.write_text(f"entries: {{wls: {text}}}".replace("allocator:", "controller:"))
+    with pytest.raises(ScenarioError) as refused:
+        load_ranking(file)
+    assert mentions(str(refused.value), "entries.wls.swap", "controller", "fmu")
 
 
 def test_an_entry_without_a_run_is_missing_and_has_no_place():

@@ -15,7 +15,8 @@
     more_entries: [tuned.yaml]         # files of entries alone
 
 A condition overrides its scenario like a run of a study. An entry swaps its FMU in for the instance
-`controller` and sets its parameters, the same in all conditions.
+`controller` and sets its parameters, the same in all conditions; `swap` swaps in what belongs to it beside
+the controller, such as an allocator.
 
 A ranking is two experiments. The first determines the steering angle A of every car, on a dry road without
 control, so that all controllers drive the same amplitudes. In the second, conditions are named runs; entry,
@@ -107,8 +108,16 @@ class EntrySpec(StrictModel):
     parameters: dict[str, Scalar] = Field(
         {}, description="Parameter, or step_size, -> value; default: those of the FMU"
     )
+    swap: dict[str, str] = Field(default={}, description="Other instance -> FMU that belongs to this entry")
     source: str = Field(min_length=1, description="Source of the controller and its gains")
     gains: Literal["authors", "tuned"] = Field("authors", description="Who chose the gains")
+
+    @field_validator("swap")
+    @classmethod
+    def _beside_the_controller(cls, swap: dict[str, str]) -> dict[str, str]:
+        if CONTROLLER in swap:
+            raise ValueError(f"swap: give the FMU of {CONTROLLER!r} as fmu")
+        return swap
 
 
 class EntriesSpec(StrictModel):
@@ -206,10 +215,12 @@ class LoadedRanking(LoadedFile):
     def variant(self, name: str) -> VariantSpec:
         """Return an entry as a level of an axis: its controller is put into a scenario."""
         spec, folder = self.entries[name]
-        elsewhere = is_path(spec.fmu) and folder != self.path.parent
-        fmu = str((folder / spec.fmu).absolute()) if elsewhere else spec.fmu
+        swap = {
+            instance: str((folder / fmu).absolute()) if is_path(fmu) and folder != self.path.parent else fmu
+            for instance, fmu in {CONTROLLER: spec.fmu, **spec.swap}.items()
+        }
         settings = {f"{CONTROLLER}.{parameter}": value for parameter, value in spec.parameters.items()}
-        return VariantSpec.model_validate({"swap": {CONTROLLER: fmu}, "set": settings})
+        return VariantSpec.model_validate({"swap": swap, "set": settings})
 
     def axis_of(self, entries: Iterable[str]) -> DesignAxisSpec:
         """Return the axis of entries, one level each."""

@@ -31,11 +31,13 @@ def entries_of(experiment: LoadedExperiment, tuned_laws: Sequence[TunedLaw]) -> 
             continue  # all trials failed
         law = tuning.laws[tuned.law]
         settings = changes_of(law, tuned.best.values).set
+        beside = {instance: fmu for instance, fmu in law.swap.items() if instance != tuning.entries}
         made = f"{experiment.identity}: {len(tuned.trials)} trials, seed {tuning.seed}"
         comes_to = f"{tuning.objective} {tuned.best.cost:.4g}, {tuned.trials[0].cost:.4g} amid the ranges"
         entries[re.sub(r"\W+", "_", f"{tuned.law.lower()}_tuned")] = {
             "title": f"tuned {tuned.law}",
             "fmu": law.swap[tuning.entries],
+            **({"swap": beside} if beside else {}),
             "gains": "tuned",
             "parameters": {target.variable: value for target, value in settings.items()},
             "source": f"{made}; {comes_to}",
