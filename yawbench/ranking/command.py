@@ -135,8 +135,9 @@ def _rank_by_threats(
 
     from .threat_runs import run_threats, table_of_levels, table_of_quantities
     from .threat_scores import scored, table_of_scores
+    from .threat_tables import main_table
     from .threats import load_threats
-    from .threats_page import main_table, threats_page
+    from .threats_page import threats_page
 
     threats = load_threats(file, more=more, quick=quick)
     _check("--only", "entry", only, threats.ranking.entries)
@@ -194,14 +195,9 @@ def _write(ranked: RankingResult, folder: Path, command: str, each: Each) -> Non
     from yawbench.studies.experiment import FIGURES
     from yawbench.studies.tables import to_csv
 
+    from .ranking_figures import draw_matrix, draw_pareto
     from .ranking_page import ranking_page
-    from .ranking_tables import (
-        columns_of_cells,
-        columns_of_entries,
-        columns_of_runs,
-        draw_matrix,
-        draw_pareto,
-    )
+    from .ranking_tables import columns_of_cells, columns_of_entries, columns_of_runs
 
     for name, columns in (
         ("table", columns_of_entries),

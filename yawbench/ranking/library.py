@@ -26,8 +26,9 @@ from yawbench.studies.jobs import Job, OnOutcome, Outcome, run_job
 from yawbench.studies.tables import to_pandas
 
 from .ranking import CONTROLLER, EntrySpec, load_ranking
+from .ranking_figures import draw_matrix, draw_pareto
 from .ranking_scores import RankingResult, run_ranking
-from .ranking_tables import columns_of_cells, columns_of_entries, draw_matrix, draw_pareto
+from .ranking_tables import columns_of_cells, columns_of_entries
 
 if TYPE_CHECKING:
     import pandas as pd

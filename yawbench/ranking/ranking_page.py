@@ -56,8 +56,8 @@ from .ranking_tables import (
 )
 from .threat_runs import published_result
 from .threat_scores import scored
+from .threat_tables import told_apart
 from .threats import load_threats
-from .threats_page import told_apart
 
 STATES = {
     RankedState.PASSED: "passed",
