@@ -132,11 +132,11 @@ CAR: dict[str, VehicleQuantity] = {
     ),
     "roll_steer_front": VehicleQuantity(
         "1",
-        "Roll steer of the front axle, positive out of the turn: steer of its wheels over the body's roll angle",
+        "Roll steer of the front axle, steer of its wheels over the body's roll, positive out of the turn",
     ),
     "roll_steer_rear": VehicleQuantity(
         "1",
-        "Roll steer of the rear axle, positive into the turn: steer of its wheels over the body's roll angle",
+        "Roll steer of the rear axle, steer of its wheels over the body's roll, positive into the turn",
     ),
     "steer_compliance_front": VehicleQuantity(
         "rad/N", "Steer by which the front wheels yield to the side force of their axle", minimum=0.0

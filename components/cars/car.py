@@ -34,8 +34,8 @@ from .plane_body import Motion
 from .road_plane import INPUTS as ROAD_PLANE
 from .road_plane import LEVEL, Pull, pull_of
 from .wheel_kinematics import Eight, slip_angle, slip_ratio, wheel_velocities
-from .wheel_steer import WheelYieldParameters, Yielding
 from .wheel_spin import spin
+from .wheel_steer import WheelYieldParameters, Yielding
 
 MOTION = (
     "velocity_x",

@@ -29,7 +29,7 @@ from yawbench.vocabulary.wheels import Four
 from ..fmi.variables import of_car
 
 LAG = 0.01
-"""Time constant [s] of the steer by compliance; chosen: a front wheel on its linkage swings at about 15 Hz."""
+"""Time constant [s] of the steer by compliance; chosen: of wheels that swing at 15 Hz."""
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,8 @@
 """Tyre models that wheel controls know, and the slip at which such a tyre's braking force is largest.
 
-With the slip angle alpha the optimum kappa_opt(alpha) of the braking force grows: of tyre set 1 at 4.5 kN and
-mu 0.9 it is 0.13 at 0, 0.29 at 8 and 0.43 at 12 degrees. At 8 degrees a slip of 0.05 gives 44 % of the largest
-force.
+With the slip angle alpha the optimum kappa_opt(alpha) of the braking force grows: of tyre set 1 at 4.5 kN
+and mu 0.9 it is 0.13 at 0, 0.29 at 8 and 0.43 at 12 degrees. At 8 degrees a slip of 0.05 gives 44 % of the
+largest force.
 """
 
 from dataclasses import dataclass
