@@ -152,7 +152,7 @@ class Car(Component):
         self.wheels = self.wheel_velocities()
         self.start_wheels()
         self.yielding = None
-        if p.steer_compliance_front or p.steer_compliance_rear or p.tyre_relaxation_length:
+        if p.steer_stiffness_front or p.steer_stiffness_rear or p.slip_angle_relaxation:
             self.yielding = Yielding(p)
             self.yielding.begin(self.steered_angles())
         self.finish(carried)

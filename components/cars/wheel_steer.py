@@ -1,15 +1,16 @@
 """Steer of the wheels by roll, wheel travel and side force, and the lag of slip angles behind them.
 
-    steer_i = e_i c_i / y_i - k Y_axle       sigma / |v_i| dalpha_i' / dt + alpha_i' = alpha_i - steer_i
+    steer_i = e_i c_i / y_i - Y_axle / k       sigma / |v_i| dalpha_i' / dt + alpha_i' = alpha_i - steer_i
 
 e is the roll steer of the axle, c_i the travel of the wheel at y_i (to the left), positive in bump, or
--phi y_i in a plant without wheel travel; k the axle's compliance to its side force Y, sigma the relaxation
-length of the tyres. alpha_i' is the slip angle that a plant gives. All three are off by default: then
+-phi y_i in a plant without wheel travel; k the axle's stiffness against its side force Y, sigma the
+relaxation length of the tyres. alpha_i' is the slip angle that a plant gives. All three are off by default: then
 alpha_i' = alpha_i.
 
 With e > 0 an axle understeers: its front wheels steer out of the turn as the body rolls (toe-out in bump),
 its rear wheels into the turn (toe-in in bump). So roll steer and bump steer are one: a wheel's steer over its
-travel. With k > 0 wheels yield to the side force; this understeers in front and oversteers at the rear.
+travel. Wheels yield to the side force, unless k is 0, which stands for rigid; this understeers in front and
+oversteers at the rear.
 
 The steer by compliance follows the force with `LAG`, as wheel and linkage have inertia; without it the loop
 of force and steer would have no time of its own. Angles are small: the tyre forces keep the directions of the
@@ -26,7 +27,7 @@ from math import exp
 
 from yawbench.vocabulary.wheels import Four
 
-from ..fmi.variables import of_car
+from ..fmi.variables import parameter
 
 LAG = 0.01
 """Time constant [s] of the steer by compliance; chosen: of wheels that swing at 15 Hz."""
@@ -34,19 +35,47 @@ LAG = 0.01
 
 @dataclass(frozen=True)
 class WheelYieldParameters:
-    """Compliance of both axles to side force, and relaxation of the slip angle."""
+    """Stiffness of both axles against side force, and relaxation of the slip angle."""
 
-    steer_compliance_front: float = of_car(0.0, "chosen: rigid")
-    steer_compliance_rear: float = of_car(0.0, "chosen: rigid")
-    tyre_relaxation_length: float = of_car(0.0, "chosen: at once")
+    steer_stiffness_front: float = parameter(
+        0.0,
+        "N/rad",
+        "Side force of the front axle over the steer by which its wheels yield, 0: rigid",
+        "chosen: rigid",
+        minimum=0.0,
+    )
+    steer_stiffness_rear: float = parameter(
+        0.0,
+        "N/rad",
+        "Side force of the rear axle over the steer by which its wheels yield, 0: rigid",
+        "chosen: rigid",
+        minimum=0.0,
+    )
+    slip_angle_relaxation: float = parameter(
+        0.0, "m", "Distance over which slip angles lag, 0: none", "chosen: at once", minimum=0.0
+    )
 
 
 @dataclass(frozen=True)
 class RollSteerParameters:
     """Roll steer of both axles."""
 
-    roll_steer_front: float = of_car(0.0, "chosen: none", minimum=-1.0, maximum=1.0)
-    roll_steer_rear: float = of_car(0.0, "chosen: none", minimum=-1.0, maximum=1.0)
+    roll_steer_front: float = parameter(
+        0.0,
+        "1",
+        "Roll steer of the front axle over the body's roll, positive out of the turn",
+        "chosen: none",
+        minimum=-1.0,
+        maximum=1.0,
+    )
+    roll_steer_rear: float = parameter(
+        0.0,
+        "1",
+        "Roll steer of the rear axle over the body's roll, positive into the turn",
+        "chosen: none",
+        minimum=-1.0,
+        maximum=1.0,
+    )
 
 
 def steer_by_travel(
@@ -67,8 +96,10 @@ class Yielding:
     """Steer by compliance of both axles, and the slip angles that lag."""
 
     def __init__(self, p: WheelYieldParameters) -> None:
-        self.front, self.rear = p.steer_compliance_front, p.steer_compliance_rear
-        self.length = p.tyre_relaxation_length
+        front, rear = p.steer_stiffness_front, p.steer_stiffness_rear
+        self.front = 1.0 / front if front > 0.0 else 0.0  # [rad/N]
+        self.rear = 1.0 / rear if rear > 0.0 else 0.0
+        self.length = p.slip_angle_relaxation
         self.steers = 0.0, 0.0
         self.angles: Four = (0.0, 0.0, 0.0, 0.0)
 

@@ -53,7 +53,8 @@ from .ranking import (
 )
 
 if TYPE_CHECKING:
-    pass
+    from .nuisance import Nuisance
+    from .settings import SettingScores
 
 UNHELD = 1.0
 """Yaw-rate ratio without a second peak after the reversal: the car keeps turning as before."""
@@ -254,6 +255,7 @@ class EntryScore:
     place: int | None = None  # shared by those that cannot be told apart; None: not ranked, runs are missing
     rank: int | None = None  # in the order; equal ones share it
     bounds: Bounds | None = None  # of the number of conditions passed
+    braking: float | None = None  # share of the time in ordinary driving [1]; None: not driven
 
     @property
     def missing(self) -> int:
@@ -363,6 +365,8 @@ class RankingResult:
     angles: dict[str, float]  # car -> A [rad]
     runs: list[RankedRun]
     scores: list[EntryScore]  # best first
+    nuisance: Nuisance | None = None  # in ordinary driving
+    settings: Sequence[SettingScores] = ()  # its own first; empty: none were driven
 
 
 def run_ranking(

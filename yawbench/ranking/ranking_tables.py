@@ -112,6 +112,11 @@ def spread(confidence: ConfidenceInterval | None, words: Callable[[float], str])
     )
 
 
+def share_text(share: float | None) -> str | None:
+    """Return a share in per cent."""
+    return None if share is None else f"{100.0 * share:.0f} %" if share >= 0.095 else f"{100.0 * share:.1f} %"
+
+
 def row_of(score: EntryScore, digits: Digits) -> dict[str, Cell]:
     """Return the row of a controller: heading -> cell; `digits`: of the numbers that decide places."""
     slip = score.mean("sideslip")
@@ -128,6 +133,7 @@ def row_of(score: EntryScore, digits: Digits) -> dict[str, Cell]:
         "gains": score.spec.gains,
         "passed": str(score.count(RankedState.PASSED)),
         "95 % interval": interval_words(score),
+        "braking": share_text(score.braking),
         "spun": str(score.count(RankedState.SPUN)),
         "runs": shown(score.share, "%", digits=digits.share),
         **means,
@@ -145,7 +151,19 @@ def table_of(ranked: RankingResult, *left_out: str) -> Table:
     digits = deciding_digits(ranked.scores)
     rows = [row_of(score, digits) for score in ranked.scores]
     kept = [heading for heading in rows[0] if heading not in left_out]
-    texts = ("place", "passed", "95 % interval", "spun", "runs", "headroom", "sideslip", "time per step")
+    if ranked.nuisance is None:
+        kept.remove("braking")
+    texts = (
+        "place",
+        "passed",
+        "95 % interval",
+        "braking",
+        "spun",
+        "runs",
+        "headroom",
+        "sideslip",
+        "time per step",
+    )
     numbers = {kept.index(heading) for heading in texts if heading in kept}
     cells = [[row[heading] for heading in kept] for row in rows]
     return Table(ranked.ranking.spec.title, kept, [*cells], [RULE], numbers)
@@ -204,6 +222,7 @@ def columns_of_entries(ranked: RankingResult) -> Table:
             _counts("passed", (score.count(RankedState.PASSED) for score in rows)),
             _numbers("passed_low", "1", (score.bounds and score.bounds.low for score in rows)),
             _numbers("passed_high", "1", (score.bounds and score.bounds.high for score in rows)),
+            _numbers("braking", "1", (score.braking for score in rows)),
             _counts("spun", (score.count(RankedState.SPUN) for score in rows)),
             _counts("missing", (score.missing for score in rows)),
             _numbers("share", "1", (None if score.missing else score.share for score in rows)),
