@@ -4,7 +4,7 @@
 
 e is the roll steer of the axle, c_i the travel of the wheel at y_i (to the left), positive in bump, or
 -phi y_i in a plant without wheel travel; k the axle's stiffness against its side force Y, sigma the
-relaxation length of the tyres. alpha_i' is the slip angle that a plant gives. All three are off by default: then
+relaxation length of the tyres. alpha_i' is the slip angle that a plant gives. All are off by default: then
 alpha_i' = alpha_i.
 
 With e > 0 an axle understeers: its front wheels steer out of the turn as the body rolls (toe-out in bump),

@@ -280,10 +280,11 @@ class LoadedRanking(LoadedFile):
         return not self.quick and not self.chosen
 
     def under(self, setting: str) -> LoadedRanking:
-        """Return the same ranking under a setting, of the conditions that it judges again."""
+        """Return the last amplitude of the conditions that a setting judges again, "": the ranking's own."""
         spec = self.spec
-        chosen = spec.settings[setting].conditions or spec.setting_conditions or [*spec.conditions]
-        return replace(self, setting=setting, chosen=tuple(chosen))
+        own = spec.settings[setting].conditions if setting else []
+        chosen = own or spec.setting_conditions or [*spec.conditions]
+        return replace(self, setting=setting, chosen=tuple(chosen), quick=True)
 
 
 @reads("ranking file", ScenarioError)

@@ -1,8 +1,8 @@
 """Settings: the same controllers with other brakes, tyres or axles, and what stays true of their order.
 
-A setting overrides what all entries share. Some conditions are judged again under each, with the amplitudes
-of the ranking itself. Of two controllers the order is *kept* if one passes more conditions under at least one
-setting and the other under none.
+A setting overrides what all entries share. Some conditions are judged again under each, at the last
+amplitude, which decides nearly all of them. Of two controllers the order is *kept* if one passes more
+conditions under at least one setting and the other under none.
 """
 
 from __future__ import annotations
@@ -61,17 +61,17 @@ def run_settings(
 
 
 def own_setting(ranked: RankingResult) -> SettingScores:
-    """Return the scores of a ranking over the conditions that settings judge again."""
-    ranking, conditions = ranked.ranking, ranked.ranking.spec.setting_conditions
-    own = ranking if not conditions else _with(ranking, conditions)
-    runs = [run for run in ranked.runs if run.condition in own.conditions]
+    """Return the scores of a ranking over the runs that settings judge again."""
+    own = ranked.ranking.under("")
+    last: dict[str, float] = {}
+    for run in ranked.runs:
+        last[run.condition] = max(abs(run.amplitude), last.get(run.condition, 0.0))
+    runs = [
+        run
+        for run in ranked.runs
+        if run.condition in own.conditions and abs(run.amplitude) == last[run.condition]
+    ]
     return SettingScores("", AS_IT_IS, own, scores_of(own, runs))
-
-
-def _with(ranking: LoadedRanking, conditions: Sequence[str]) -> LoadedRanking:
-    from dataclasses import replace
-
-    return replace(ranking, chosen=tuple(conditions))
 
 
 @dataclass(frozen=True)
