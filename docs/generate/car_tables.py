@@ -61,8 +61,8 @@ RANGES = (
     ),
     Range(
         "roll damping", "roll_damping [1]", 1.0, 0.2, 0.6,
-        "0.2 to 0.6: the upper end is that of cars that Allen et al. measured, DOT HS 807 956, 1992, the lower "
-        "one from memory",
+        "0.2 to 0.6: the upper end is that of cars that Allen et al. measured, DOT HS 807 956, 1992, the "
+        "lower one from memory",
     ),
     Range(
         "stop from 100 km/h [m]", "stopping_distance [m]", 1.0, 33.0, 50.0,
