@@ -19,7 +19,7 @@ from yawbench.ranking.ranking import LoadedRanking, load_ranking
 from yawbench.ranking.ranking_scores import EntryScore, RankedState, RankingCell, RankingResult, placed
 from yawbench.ranking.ranking_tables import interval_words, sign_of
 from yawbench.ranking.settings import AS_IT_IS, SettingScores, settings_sentence
-from yawbench.ranking.whole import with_braking
+from yawbench.ranking.whole import WholeRanking, with_braking
 from yawbench.studies.confidence import ConfidenceInterval
 from yawbench.studies.jobs import STEP_TIME
 from yawbench.studies.tables import Table
@@ -81,7 +81,7 @@ class PublishedCell(RankingCell):
         return ConfidenceInterval(self.number(key) or 0.0, self.number(f"{key}_half_width") or 0.0)
 
 
-def published() -> RankingResult:
+def published() -> WholeRanking:
     """Return the ranking that follows from the published cells, without what has none yet."""
     ranking = load_ranking(FILE)
     with RUNS.open(encoding="utf-8", newline="") as lines:
@@ -100,7 +100,7 @@ def published() -> RankingResult:
     ])  # fmt: skip
     nuisance = _nuisance(ranking)
     settings = _settings(ranking)
-    return RankingResult(ranking, {}, [], with_braking(scores, nuisance), nuisance, settings)
+    return WholeRanking(ranking, {}, [], with_braking(scores, nuisance), nuisance, settings)
 
 
 def _nuisance(ranking: LoadedRanking) -> Nuisance | None:
@@ -212,7 +212,7 @@ def pages_with_tables() -> dict[Path, str]:
     return {PAGE: page, CHOOSING: choosing(result)}
 
 
-def choosing(result: RankingResult) -> str:
+def choosing(result: WholeRanking) -> str:
     """Return the page for choosing a law: the answer and the tables beside the matrix."""
     page = CHOOSING.read_text(encoding="utf-8")
     parts = [wrapped(settings_sentence(result.settings))]

@@ -17,17 +17,18 @@ import numpy as np
 from yawbench.studies.confidence import crossed_probability, sign_test, told_apart
 from yawbench.studies.tables import Cell, Table
 
-from .ranking_scores import IDLE, EntryScore, RankedState, RankingResult, apart_by_conditions
+from .ranking_scores import IDLE, EntryScore, RankedState, apart_by_conditions
 from .ranking_tables import share_text
 from .threat_runs import ThreatResult
 from .threat_tables import levels_table
+from .whole import WholeRanking
 
 MISLEAD = ("friction", "model", "delay", "noise", "gyro_bias", "mass")
 """Threats that mislead a law: friction and tyres told wrong, late moments, poor sensors, load. Those that a
 threat file has are shown."""
 
 
-def choosing_table(ranked: RankingResult, threats: ThreatResult | None) -> Table:
+def choosing_table(ranked: WholeRanking, threats: ThreatResult | None) -> Table:
     """Return the table for choosing a law.
 
     Args:
@@ -76,7 +77,7 @@ def _micro(number: float | None) -> float | None:
     return None if number is None else 1e6 * number
 
 
-def _clear_pairs(ranked: RankingResult, scores: Sequence[EntryScore]) -> list[str | None]:
+def _clear_pairs(ranked: WholeRanking, scores: Sequence[EntryScore]) -> list[str | None]:
     """Return the clear pairs by conditions, nuisance and intervention, and none for the time."""
     if len(scores) < 2:
         return [None] * 4

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from yawbench.studies.experiment_result import Each
 
     from .ranking import EntrySpec
-    from .ranking_scores import RankingResult
+    from .whole import WholeRanking
 
 RankingFile = Annotated[
     Path, named("a ranking file", help="Ranking: YAML file, or a name in scenarios/.", metavar="RANKING")
@@ -188,7 +188,7 @@ def _entry(text: str) -> tuple[str, EntrySpec]:
     return words.replace(", ", "-").replace(" ", "="), spec
 
 
-def _write(ranked: RankingResult, folder: Path, command: str, each: Each) -> None:
+def _write(ranked: WholeRanking, folder: Path, command: str, each: Each) -> None:
     """Draw the figures, write tables, page and side files, and print where the page is."""
     from yawbench.figures.style import save
     from yawbench.foundation.safe_files import write_whole

@@ -62,6 +62,7 @@ from .threat_runs import ThreatResult, published_result
 from .threat_scores import scored
 from .threat_tables import told_apart
 from .threats import load_threats
+from .whole import WholeRanking
 
 STATES = {
     RankedState.PASSED: "passed",
@@ -151,7 +152,7 @@ class CellPart(Part):
     worst: str  # which is its worst run
 
 
-def ranking_page(ranked: RankingResult, folder: Path, command: str, each: Each = map) -> str:
+def ranking_page(ranked: WholeRanking, folder: Path, command: str, each: Each = map) -> str:
     """Return the page as HTML, and write a side file for every cell: its numbers and its worst run.
 
     Args:
@@ -194,7 +195,7 @@ def ranking_page(ranked: RankingResult, folder: Path, command: str, each: Each =
     return render(view)
 
 
-def answer(ranked: RankingResult) -> str:
+def answer(ranked: WholeRanking) -> str:
     """Return the result in sentences: who can be told apart, and what the first and no control pass."""
     number = len(ranked.ranking.conditions)
     placed = [score for score in ranked.scores if score.place]
@@ -224,7 +225,7 @@ def answer(ranked: RankingResult) -> str:
     return " ".join(filter(None, (first_of_all, result, surely, ordinary, threats)))
 
 
-def beside_matrix(ranked: RankingResult) -> list[Table]:
+def beside_matrix(ranked: WholeRanking) -> list[Table]:
     """Return the tables beside the matrix: choosing a law, other settings, nuisance; none of a quick look."""
     tables = []
     if ranked.nuisance:
@@ -270,7 +271,7 @@ def _image(file: Path, title: str) -> FigureImage | None:
     return image_of(file, title) if file.is_file() else None
 
 
-def _rows(ranked: RankingResult, digits: Digits) -> list[MatrixRow]:
+def _rows(ranked: WholeRanking, digits: Digits) -> list[MatrixRow]:
     """Return the rows of the matrix."""
     sharing = Counter(score.place for score in ranked.scores)
     rows = []

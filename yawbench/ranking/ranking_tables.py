@@ -151,7 +151,7 @@ def table_of(ranked: RankingResult, *left_out: str) -> Table:
     digits = deciding_digits(ranked.scores)
     rows = [row_of(score, digits) for score in ranked.scores]
     kept = [heading for heading in rows[0] if heading not in left_out]
-    if ranked.nuisance is None:
+    if all(score.braking is None for score in ranked.scores):
         kept.remove("braking")
     texts = (
         "place",

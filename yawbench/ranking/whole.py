@@ -3,19 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from yawbench.studies.executor import Executor
 
 from .nuisance import Nuisance, run_nuisance
 from .ranking import LoadedRanking
 from .ranking_scores import EntryScore, RankingResult, run_ranking
-from .settings import run_settings
+from .settings import SettingScores, run_settings
+
+
+@dataclass(frozen=True)
+class WholeRanking(RankingResult):
+    """Result of a ranking with all that belongs to it."""
+
+    nuisance: Nuisance | None = None  # in ordinary driving; None: not driven
+    settings: Sequence[SettingScores] = ()  # its own first; empty: none were driven
 
 
 def run_whole(
     ranking: LoadedRanking, execute: Executor, *, only: Collection[str] = (), keep: bool = True
-) -> RankingResult:
+) -> WholeRanking:
     """Execute the missing runs of a ranking and all that belongs to it; arguments as of `run_ranking`.
 
     A quick look and selected conditions are those of the matrix alone.
@@ -24,16 +32,13 @@ def run_whole(
         YawbenchError: a run cannot start, or A cannot be determined.
     """
     ranked = run_ranking(ranking, execute, only=only, keep=keep)
+    own = ranked.ranking, ranked.angles, ranked.runs
     if not ranking.whole:
-        return ranked
+        return WholeRanking(*own, ranked.scores)
     spec = ranking.spec
     nuisance = run_nuisance(ranking, execute, only=only) if spec.ordinary else None
-    return replace(
-        ranked,
-        scores=with_braking(ranked.scores, nuisance),
-        nuisance=nuisance,
-        settings=run_settings(ranked, execute, only=only) if spec.settings else (),
-    )
+    settings = run_settings(ranked, execute, only=only) if spec.settings else ()
+    return WholeRanking(*own, with_braking(ranked.scores, nuisance), nuisance, settings)
 
 
 def with_braking(scores: Sequence[EntryScore], nuisance: Nuisance | None) -> list[EntryScore]:
