@@ -13,6 +13,7 @@ from yawbench.commands.schema import kinds, schema_text
 
 from . import (
     blind_tables,
+    car_tables,
     commands,
     evidence,
     fuzzy_sets,
@@ -46,7 +47,7 @@ PAGES: dict[str, Callable[[], str]] = {
     "theory/paper_c_sets.svg": fuzzy_sets.figure,
 }
 """Path in the docs -> what returns its text."""
-PUBLISHED = (blind_tables, matrix_tables, monitor_tables, threat_tables)
+PUBLISHED = (blind_tables, car_tables, matrix_tables, monitor_tables, threat_tables)
 """Modules of tables from published runs, which are parts of pages."""
 
 

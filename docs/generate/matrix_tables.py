@@ -1,7 +1,8 @@
 """The matrix of docs/ranking.md from published cells: `python -m docs.generate.matrix_tables`.
 
 They come from scenarios/proving_ground/matrix.csv, every cell of `yawbench rank`, which `--runs TABLE` takes
-from the ranking's cells.csv.
+from the ranking's cells.csv, and from nuisance.csv and settings.csv, which it takes from beside that. It also
+writes docs/choosing.md.
 """
 
 from __future__ import annotations
@@ -9,23 +10,29 @@ from __future__ import annotations
 import csv
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from yawbench.ranking import ranking_page
-from yawbench.ranking.ranking import load_ranking
+from yawbench.ranking.nuisance import Nuisance, OrdinaryRun, nuisance_of, nuisance_sentence
+from yawbench.ranking.ranking import LoadedRanking, load_ranking
 from yawbench.ranking.ranking_scores import EntryScore, RankedState, RankingCell, RankingResult, placed
 from yawbench.ranking.ranking_tables import interval_words, sign_of
+from yawbench.ranking.settings import AS_IT_IS, SettingScores, settings_sentence
+from yawbench.ranking.whole import WholeRanking, with_braking
 from yawbench.studies.confidence import ConfidenceInterval
 from yawbench.studies.jobs import STEP_TIME
 from yawbench.studies.tables import Table
 
-from .published import markdown, replaced, wrapped, write_pages
+from .published import markdown, replaced, take, wrapped, write_pages
 
 ROOT = Path(__file__).resolve().parents[2]
 FILE = ROOT / "scenarios" / "proving_ground" / "ranking.yaml"
 RUNS = FILE.parent / "matrix.csv"
+NUISANCE = FILE.parent / "nuisance.csv"
+SETTINGS = FILE.parent / "settings.csv"
 PAGE = ROOT / "docs" / "ranking.md"
+CHOOSING = ROOT / "docs" / "choosing.md"
 NOISY = "hard_sensors"
 """The condition whose seeds are told in a sentence."""
 TOLD = ("pid_tuned", "sliding_mode", "dead_band", "fnn")
@@ -35,6 +42,12 @@ COLUMNS = (
     "sideslip [rad]", "sideslip_half_width [rad]", "speed_lost [m/s]", "intervention [N.m.s]",
     "chatter [N.m/s]", f"{STEP_TIME} [s]",
 )  # fmt: skip
+
+
+OF_NUISANCE = ("entry", "situation", "car", "repeat", "braking [1]", "pressure [Pa]", "speed_end [m/s]")
+OF_SETTINGS = ("setting", "entry", "condition", "state", "runs", "passed", "sideslip [rad]")
+BESIDE = {NUISANCE: OF_NUISANCE, SETTINGS: OF_SETTINGS}
+"""Published tables beside the cells -> their columns."""
 
 
 @dataclass(frozen=True)
@@ -61,26 +74,78 @@ class PublishedCell(RankingCell):
     def number(self, key: str) -> float | None:
         """Return a published number in SI units, or points."""
         column = next(name for name in COLUMNS if name.partition(" ")[0] == key)
-        return float(self.row[column]) if self.row[column] else None
+        return float(self.row[column]) if self.row.get(column) else None
 
     def over_seeds(self, key: str) -> ConfidenceInterval:
         """Return the mean of headroom or sideslip over seeds with its interval."""
         return ConfidenceInterval(self.number(key) or 0.0, self.number(f"{key}_half_width") or 0.0)
 
 
-def published() -> RankingResult:
-    """Return the ranking that follows from the published cells."""
+def published() -> WholeRanking:
+    """Return the ranking that follows from the published cells, without what has none yet."""
     ranking = load_ranking(FILE)
     with RUNS.open(encoding="utf-8", newline="") as lines:
         cells = {
             (row["entry"], row["condition"]): PublishedCell(row["entry"], row["condition"], [], row)
             for row in csv.DictReader(lines)
         }
+    known = {key for _, key in cells}
+    entries = {name: entry for name, entry in ranking.entries.items() if any(name == e for e, _ in cells)}
+    ranking = replace(
+        ranking, entries=entries, chosen=tuple(name for name in ranking.spec.conditions if name in known)
+    )
     scores = placed([
         EntryScore(name, spec, {key: cells[name, key] for key in ranking.conditions})
         for name, (spec, _) in ranking.entries.items()
     ])  # fmt: skip
-    return RankingResult(ranking, {}, [], scores)
+    nuisance = _nuisance(ranking)
+    settings = _settings(ranking)
+    return WholeRanking(ranking, {}, [], with_braking(scores, nuisance), nuisance, settings)
+
+
+def _nuisance(ranking: LoadedRanking) -> Nuisance | None:
+    """Return the published nuisance; None without any."""
+    if not NUISANCE.is_file():
+        return None
+    with NUISANCE.open(encoding="utf-8", newline="") as lines:
+        runs = [
+            OrdinaryRun(
+                row["entry"], row["situation"], row["car"], row["repeat"] or None, None,
+                {key.partition(" ")[0]: float(row[key]) for key in OF_NUISANCE[4:] if row[key]},
+            )
+            for row in csv.DictReader(lines)
+        ]  # fmt: skip
+    return nuisance_of(ranking, runs)
+
+
+def _settings(ranking: LoadedRanking) -> list[SettingScores]:
+    """Return the published scores under settings, the ranking's own first; none without any."""
+    if not SETTINGS.is_file():
+        return []
+    with SETTINGS.open(encoding="utf-8", newline="") as lines:
+        rows = [*csv.DictReader(lines)]
+    found = []
+    for name in dict.fromkeys(row["setting"] for row in rows):
+        if name and name not in ranking.spec.settings:
+            continue
+        under = ranking.under(name)
+        own = {(row["entry"], row["condition"]): row for row in rows if row["setting"] == name}
+        title = ranking.spec.settings[name].title if name else AS_IT_IS
+        cells = {
+            (entry, key): PublishedCell(entry, key, [], own.get((entry, key), MISSING))
+            for entry in ranking.entries
+            for key in under.conditions
+        }
+        scores = placed([
+            EntryScore(entry, spec, {key: cells[entry, key] for key in under.conditions})
+            for entry, (spec, _) in ranking.entries.items()
+        ])  # fmt: skip
+        found.append(SettingScores(name, title, under, scores))
+    return found
+
+
+MISSING = {"state": RankedState.MISSING.value, "runs": "1", "passed": "0"}
+"""A cell that is not published."""
 
 
 def matrix(result: RankingResult) -> Table:
@@ -144,8 +209,25 @@ def pages_with_tables() -> dict[Path, str]:
         "means": f"{markdown(numbers(result))}\n\n{wrapped(seeds_sentence(result))}",
     }.items():
         page = replaced(page, name, text)
-    return {PAGE: page}
+    return {PAGE: page, CHOOSING: choosing(result)}
+
+
+def choosing(result: WholeRanking) -> str:
+    """Return the page for choosing a law: the answer and the tables beside the matrix."""
+    page = CHOOSING.read_text(encoding="utf-8")
+    parts = [wrapped(settings_sentence(result.settings))]
+    parts += [wrapped(nuisance_sentence(result.nuisance))] if result.nuisance else []
+    for table in ranking_page.beside_matrix(result):
+        parts += [f"## {table.title}", markdown(table)]
+    return replaced(page, "choosing", "\n\n".join(filter(None, parts)))
+
+
+def publish_beside(cells: Path) -> None:
+    """Take the tables beside the cells of a ranking, if they are there."""
+    for published_file, columns in BESIDE.items():
+        if (table := cells.parent / published_file.name).is_file():
+            take(table, published_file, columns)
 
 
 if __name__ == "__main__":
-    write_pages(__doc__, RUNS, COLUMNS, pages_with_tables)
+    write_pages(__doc__, RUNS, COLUMNS, pages_with_tables, publish_beside)

@@ -35,8 +35,22 @@ def markdown(table: Table) -> str:
     return "\n\n".join(["\n".join(lines), *map(wrapped, table.notes)])
 
 
+def take(table: Path, runs: Path, columns: Sequence[str]) -> None:
+    """Write the published runs from the columns of a table."""
+    with table.open(encoding="utf-8", newline="") as lines:
+        rows = list(csv.DictReader(lines))
+    with runs.open("w", encoding="utf-8", newline="") as out:
+        writer = csv.DictWriter(out, columns, extrasaction="ignore", lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+
+
 def write_pages(
-    about: str | None, runs: Path, columns: Sequence[str], pages: Callable[[], dict[Path, str]]
+    about: str | None,
+    runs: Path,
+    columns: Sequence[str],
+    pages: Callable[[], dict[Path, str]],
+    beside: Callable[[Path], None] | None = None,
 ) -> None:
     """Write pages anew; with `--runs TABLE`, first the published runs from the table of an experiment.
 
@@ -45,16 +59,14 @@ def write_pages(
         runs: file of the published runs.
         columns: columns of the table that are published.
         pages: returns the pages.
+        beside: takes further tables from beside that of `--runs`.
     """
     options = argparse.ArgumentParser(description=about)
     options.add_argument("--runs", type=Path, metavar="TABLE")
     table = options.parse_args().runs
     if table:
-        with table.open(encoding="utf-8", newline="") as lines:
-            rows = list(csv.DictReader(lines))
-        with runs.open("w", encoding="utf-8", newline="") as out:
-            writer = csv.DictWriter(out, columns, extrasaction="ignore", lineterminator="\n")
-            writer.writeheader()
-            writer.writerows(rows)
+        take(table, runs, columns)
+        if beside:
+            beside(table)
     for page, text in pages().items():
         page.write_text(text, encoding="utf-8")

@@ -6,10 +6,17 @@ from dataclasses import replace
 from pathlib import Path
 
 from yawbench.foundation.messages import listed
-from yawbench.ranking import threats_page
-from yawbench.ranking.ranking_tables import gains_sentence, gains_table, seeds_table
+from yawbench.ranking import threat_tables as tables
+from yawbench.ranking.disciplines import discipline_table, disciplines, overview
+from yawbench.ranking.gains_and_laws import (
+    ComparedGains,
+    compared_gains,
+    gains_sentence,
+    gains_table,
+    seeds_table,
+)
 from yawbench.ranking.threat_runs import ThreatResult, published_result
-from yawbench.ranking.threat_scores import ComparedGains, ScoreTable, compared_gains, scored
+from yawbench.ranking.threat_scores import ScoreTable, scored
 from yawbench.ranking.threats import load_threats
 from yawbench.studies.confidence import CONFIDENCE
 
@@ -28,15 +35,15 @@ def tables_text(result: ThreatResult) -> str:
     gains = compared_gains(result)
     parts = [
         "### Who can be told apart",
-        wrapped(threats_page.answer(result, scores)),
+        wrapped(tables.answer(result, scores)),
         wrapped(differences_sentences(result, scores, gains)),
-        markdown(threats_page.main_table(result, scores)),
+        markdown(tables.main_table(result, scores)),
         "Highest levels survived:",
-        markdown(threats_page.levels_table(result, order)),
+        markdown(tables.levels_table(result, order)),
         "### The threats",
-        markdown(threats_page.threats_table(result)),
+        markdown(tables.threats_table(result)),
         "### Orders without a threat or a car",
-        *map(markdown, threats_page.orders_tables(result, scores)),
+        *map(markdown, tables.orders_tables(result, scores)),
     ]
     if gains:
         parts += [
@@ -45,21 +52,21 @@ def tables_text(result: ThreatResult) -> str:
             markdown(gains_table(result, gains)),
             markdown(seeds_table(result, gains)),
         ]
-    others = threats_page.compared_settings(result)
+    others = tables.compared_settings(result)
     if others:
-        parts += ["### What settings change", markdown(threats_page.settings_table(result, others))]
+        parts += ["### What settings change", markdown(tables.settings_table(result, others))]
     for name in others:
         title = threats.spec.settings[name].title
-        parts += [f"### Setting: {title}", markdown(threats_page.setting_table(result, name))]
-    driven = [threats_page.discipline_table(result, test) for test in threats_page.disciplines(result)]
-    for table in (threats_page.overview(result, scores), *driven):
+        parts += [f"### Setting: {title}", markdown(tables.setting_table(result, name))]
+    driven = [discipline_table(result, test) for test in disciplines(result)]
+    for table in (overview(result, scores), *driven):
         parts += [f"### {table.title or 'All disciplines'}", markdown(table)]
     return "\n\n".join(parts)
 
 
 def differences_sentences(result: ThreatResult, scores: ScoreTable, gains: ComparedGains | None) -> str:
     """Return whom the best is not clearly better than, and which laws gain clearly by tuning."""
-    titles = threats_page.titles_of(result)
+    titles = tables.titles_of(result)
     best, *behind = scores.order()
     equals = listed([titles[other] for other in behind if other not in scores.behind(best)]) or "none"
     sentence = f"By these differences {titles[best]} is not clearly better than {equals}."

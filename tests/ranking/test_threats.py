@@ -14,21 +14,20 @@ from tests.refusals import mentions
 from tests.reports.made_up import unpacked
 from yawbench.foundation.errors import ScenarioError
 from yawbench.orchestrator.scenario.loader import SHIPPED
+from yawbench.ranking.disciplines import discipline_table, disciplines, overview
+from yawbench.ranking.gains_and_laws import compared_gains, gains_and_laws, ratio_of_spreads
 from yawbench.ranking.threat_runs import RESOLUTION, Attempt, Survived, ThreatResult, _search
 from yawbench.ranking.threat_scores import (
-    compared_gains,
     compared_setting,
-    gains_and_laws,
     mean_positions,
     mean_ranks,
     moves_between,
-    ratio_of_spreads,
     score_table,
     scored,
     scores_without,
 )
+from yawbench.ranking.threat_tables import car_tables
 from yawbench.ranking.threats import LoadedThreats, QuantitySpec, ThreatSpec, load_threats
-from yawbench.ranking.threats_page import car_tables, discipline_table, disciplines, overview
 from yawbench.reports.page_parts import _templates
 from yawbench.studies.executor import side_by_side
 

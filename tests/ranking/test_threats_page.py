@@ -16,8 +16,9 @@ from tests.reports.made_up import unpacked
 from tests.reports.test_sweep_page import MOST_ELEMENTS
 from yawbench.ranking.threat_runs import published_result
 from yawbench.ranking.threat_scores import scored
+from yawbench.ranking.threat_tables import compared_settings
 from yawbench.ranking.threats import REFERENCE, load_threats
-from yawbench.ranking.threats_page import compared_settings, threats_page
+from yawbench.ranking.threats_page import threats_page
 
 
 @pytest.fixture(scope="module")

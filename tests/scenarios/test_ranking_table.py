@@ -71,7 +71,11 @@ def test_the_conclusions_on_passes_are_those_of_the_table(published, by_name, co
     ]
     assert len(tuned) == 8
     assert sentence_has(
-        conclusions, between(tuned, 0), f"{len(RANKING.conditions)} conditions", "pass", "conditions"
+        conclusions,
+        between(tuned, 0),
+        f"{len(published.ranking.conditions)} conditions",
+        "pass",
+        "conditions",
     )
     (few,) = {len(passed(by_name[name])) for name in ("pid", "lqr", "mpc")}
     assert sentence_has(conclusions, few, "LQR", "predictive")

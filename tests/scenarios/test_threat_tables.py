@@ -14,16 +14,17 @@ import pytest
 from docs.generate import threat_tables
 from tests.command_line import status_of
 from tests.refusals import sentence_has
-from yawbench.ranking import threats_page
+from yawbench.ranking.disciplines import disciplines
+from yawbench.ranking.gains_and_laws import compared_gains
 from yawbench.ranking.ranking import angle_experiment, angles_of
 from yawbench.ranking.threat_runs import Survived, ThreatResult, published_result, survivals
 from yawbench.ranking.threat_scores import (
-    compared_gains,
     compared_setting,
     moves_between,
     scored,
     scores_without,
 )
+from yawbench.ranking.threat_tables import compared_settings, titles_of
 from yawbench.ranking.threats import REFERENCE, SearchPlace, load_threats
 from yawbench.studies.executor import Executor, runner_of
 
@@ -87,27 +88,24 @@ def test_the_sentences_on_threats_have_the_numbers_of_the_tables(published, text
         "vary",
         "luck",
     )
-    moved = {
-        name: 100 * compared_setting(published, name).moved
-        for name in threats_page.compared_settings(published)
-    }
+    moved = {name: 100 * compared_setting(published, name).moved for name in compared_settings(published)}
     assert sentence_has(text, f"{-moved['bound_15']:.0f} %", "levels", "fall")
     assert sentence_has(text, f"{moved['bound_30']:.0f} %", "levels", "rise")
     assert sentence_has(text, f"{-moved['unguarded']:.1f} %", "levels", "fall")
     assert sentence_has(text, f"{-moved['authors']:.1f} %", "lower", "levels")
     correlations = {
         test.title: moves_between(scores.by_entry(), test.scores.by_entry(), REFERENCE).correlation
-        for test in threats_page.disciplines(published)
+        for test in disciplines(published)
     }
     speed, braking, step, wind = (f"{x + 0.0:.1f}".replace("-0.0", "0.0") for x in correlations.values())
     assert sentence_has(text, wind, step, braking, speed, "side", "wind")
-    apart = {test.title: test.scores.apart for test in threats_page.disciplines(published)}
+    apart = {test.title: test.scores.apart for test in disciplines(published)}
     for title in ("Step steer", "Gust of side wind"):
         assert sentence_has(text, int(apart[title].better.sum()), title.split()[-1], "210", "pairs")
 
 
 def test_the_sentences_on_who_is_first_are_those_of_the_tables(published, text):
-    scores, titles = scored(published), threats_page.titles_of(published)
+    scores, titles = scored(published), titles_of(published)
     behind = scores.behind(scores.order()[0])
     assert sentence_has(text, f"{len(ENTRIES) - 1 - len(behind)} entries", "clearly", "better")
     helped = compared_gains(published).helped
@@ -140,7 +138,7 @@ def test_the_sentences_on_settings_are_those_of_the_tables(published, text):
         assert compared.table.order()[0] == compared.main.order()[0] == "pid_tuned"
     compared = compared_setting(published, "unguarded")
     moves = moves_between(compared.main.by_entry(), compared.table.by_entry(), REFERENCE)
-    title = threats_page.titles_of(published)[moves.farthest]
+    title = titles_of(published)[moves.farthest]
     assert sentence_has(text, title, moves.before, moves.after, "goes", "place")
 
 

@@ -465,6 +465,8 @@ def _signals(results: Results, chosen: Metric) -> list[list[str]]:
 def _beside(results: Results, column: str, measure: Measure) -> list[str]:
     """Return the further columns that a measure takes; none if one is missing."""
     name, signal = variable_of(column), measure.signal or ""
+    if column == _column(results, signal):  # by an input's name, whose column is that of its source
+        name = signal
     wheel = name[len(signal) :]
     if not name.startswith(signal) or (wheel and wheel[1:] not in WHEELS):
         return []

@@ -39,6 +39,9 @@ JERK_WINDOW = 0.1
 """Averaging time of a signal before its slope is taken [s]. Chosen: the plain difference quotient of an
 acceleration is the jump at a controller's samples; people feel some 10 Hz at most."""
 
+BRAKED = 20.0
+"""Braking torque above which a wheel counts as braked [N.m]. Chosen: 1 bar at a front wheel."""
+
 Function = Callable[..., Any]
 F = TypeVar("F", bound=Function)
 
@@ -313,6 +316,23 @@ def stability_index(t: np.ndarray, x: np.ndarray, x_rate: np.ndarray) -> float:
 def time_beyond(t: np.ndarray, x: np.ndarray, x_rate: np.ndarray) -> float:
     outside = np.abs(x_rate + RETURN_RATE * x) > BOUNDARY  # counted in whole samples
     return float(np.sum(np.diff(t)[outside[:-1]])) / float(t[-1] - t[0])
+
+
+@measure(
+    "share of T with T_i < -20 N.m at any wheel",
+    "share of the time in which any wheel is braked, by more than a pressure of 1 bar gives a front wheel",
+    "%",
+)
+def braked_share(
+    t: np.ndarray,
+    wheel_torque_fl: np.ndarray,
+    wheel_torque_fr: np.ndarray,
+    wheel_torque_rl: np.ndarray,
+    wheel_torque_rr: np.ndarray,
+) -> float:
+    least = np.minimum.reduce([wheel_torque_fl, wheel_torque_fr, wheel_torque_rl, wheel_torque_rr])
+    braked = least < -BRAKED  # counted in whole samples
+    return float(np.sum(np.diff(t)[braked[:-1]])) / float(t[-1] - t[0])
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from yawbench.studies.experiment_result import Each
 
     from .ranking import EntrySpec
-    from .ranking_scores import RankingResult
+    from .whole import WholeRanking
 
 RankingFile = Annotated[
     Path, named("a ranking file", help="Ranking: YAML file, or a name in scenarios/.", metavar="RANKING")
@@ -79,8 +79,9 @@ def rank(
     from yawbench.studies.tables import records_in
 
     from .ranking import load_ranking
-    from .ranking_scores import run_ranking
+    from .ranking_page import beside_matrix
     from .ranking_tables import columns_of_entries, table_of
+    from .whole import run_whole
 
     more = dict(map(_entry, controller or ()))
     if "threats" in (yaml_lines.read(file, what="ranking file").data or {}):
@@ -99,11 +100,11 @@ def rank(
         return
     hold(context, folder)
     with stoppable(folder), executor_of(folder, ranking.identity, options, format="parquet") as execute:
-        ranked = run_ranking(ranking, execute, only=only or ())
+        ranked = run_whole(ranking, execute, only=only or ())
         command = command_of("rank", file, quick=quick, controller=controller, condition=condition)
         _write(ranked, folder, command, pooled(context, options))
     output.answer(folder=folder, page=folder / PAGE, entries=records_in(columns_of_entries(ranked)))
-    print_tables([table_of(ranked, "gains", "speed lost", "chatter")])
+    print_tables([table_of(ranked, "gains", "speed lost", "chatter"), *beside_matrix(ranked)])
     if unranked := [score.entry for score in ranked.scores if score.missing]:
         say(f"not ranked (missing runs): {', '.join(unranked)}")
 
@@ -135,8 +136,9 @@ def _rank_by_threats(
 
     from .threat_runs import run_threats, table_of_levels, table_of_quantities
     from .threat_scores import scored, table_of_scores
+    from .threat_tables import main_table
     from .threats import load_threats
-    from .threats_page import main_table, threats_page
+    from .threats_page import threats_page
 
     threats = load_threats(file, more=more, quick=quick)
     _check("--only", "entry", only, threats.ranking.entries)
@@ -186,7 +188,7 @@ def _entry(text: str) -> tuple[str, EntrySpec]:
     return words.replace(", ", "-").replace(" ", "="), spec
 
 
-def _write(ranked: RankingResult, folder: Path, command: str, each: Each) -> None:
+def _write(ranked: WholeRanking, folder: Path, command: str, each: Each) -> None:
     """Draw the figures, write tables, page and side files, and print where the page is."""
     from yawbench.figures.style import save
     from yawbench.foundation.safe_files import write_whole
@@ -194,14 +196,11 @@ def _write(ranked: RankingResult, folder: Path, command: str, each: Each) -> Non
     from yawbench.studies.experiment import FIGURES
     from yawbench.studies.tables import to_csv
 
+    from .nuisance import columns_of_nuisance
+    from .ranking_figures import draw_matrix, draw_pareto
     from .ranking_page import ranking_page
-    from .ranking_tables import (
-        columns_of_cells,
-        columns_of_entries,
-        columns_of_runs,
-        draw_matrix,
-        draw_pareto,
-    )
+    from .ranking_tables import columns_of_cells, columns_of_entries, columns_of_runs
+    from .settings import columns_of_settings
 
     for name, columns in (
         ("table", columns_of_entries),
@@ -209,6 +208,10 @@ def _write(ranked: RankingResult, folder: Path, command: str, each: Each) -> Non
         ("runs", columns_of_runs),
     ):
         write_whole(folder / f"{name}.csv", to_csv(columns(ranked)))
+    if ranked.nuisance:
+        write_whole(folder / "nuisance.csv", to_csv(columns_of_nuisance(ranked.nuisance)))
+    if ranked.settings:
+        write_whole(folder / "settings.csv", to_csv(columns_of_settings(ranked.settings)))
     save(draw_matrix(ranked, command), folder / FIGURES / "matrix")
     try:
         save(draw_pareto(ranked, command), folder / FIGURES / "pareto")

@@ -26,8 +26,10 @@ from yawbench.studies.jobs import Job, OnOutcome, Outcome, run_job
 from yawbench.studies.tables import to_pandas
 
 from .ranking import CONTROLLER, EntrySpec, load_ranking
-from .ranking_scores import RankingResult, run_ranking
-from .ranking_tables import columns_of_cells, columns_of_entries, draw_matrix, draw_pareto
+from .ranking_figures import draw_matrix, draw_pareto
+from .ranking_scores import RankingResult
+from .ranking_tables import columns_of_cells, columns_of_entries
+from .whole import run_whole
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -110,7 +112,7 @@ def rank(
         execute = stack.enter_context(
             Executor(folder, loaded.identity, runner, planner, of_jobs={"format": "parquet"})
         )
-        return Ranking(run_ranking(loaded, execute, keep=out is not None))
+        return Ranking(run_whole(loaded, execute, keep=out is not None))
 
 
 def _entries(controller: Any, name: str) -> tuple[dict[str, EntrySpec], dict[Path, PythonComponent]]:

@@ -73,6 +73,12 @@ class CarSpec(OverrideSpec):
     slow_steer: str = Field(min_length=1, description="Scenario of slowly increasing steer, for A")
 
 
+def _one_target(levels: dict[str, list[Scalar]]) -> dict[str, list[Scalar]]:
+    if len(levels) > 1 or not all(levels.values()):
+        raise ValueError("repeats: one instance.parameter with its values")
+    return levels
+
+
 class ConditionSpec(OverrideSpec):
     """A condition for all controllers: a car, a scenario of sine with dwell, and overrides."""
 
@@ -92,12 +98,37 @@ class ConditionSpec(OverrideSpec):
         """Heading of the condition's column."""
         return (self.short or self.title) + (" *" if self.seen else "")
 
-    @field_validator("repeats")
-    @classmethod
-    def _one_target(cls, levels: dict[str, list[Scalar]]) -> dict[str, list[Scalar]]:
-        if len(levels) > 1 or not all(levels.values()):
-            raise ValueError("repeats: one instance.parameter with its values")
-        return levels
+    one_target = field_validator("repeats")(_one_target)
+
+
+class OrdinarySpec(OverrideSpec):
+    """Ordinary driving, in which no controller should act: a scenario that some cars drive."""
+
+    title: str = Field(min_length=1, description="Its words")
+    short: str = Field("", description="Words for the head of a column; default: all of them")
+    scenario: str = Field(min_length=1, description="Scenario of one run, relative to this file")
+    cars: list[str] = Field([], description="Keys of `cars`; default: all")
+    lateral: float | None = Field(
+        None,
+        gt=0.0,
+        description="Lateral acceleration of the sine [m/s2]: its amplitude is in proportion to A",
+    )
+    repeats: dict[str, list[Scalar]] = Field({}, description="instance.parameter -> values, such as seeds")
+    driver_brakes: bool = Field(False, description="Whether the driver brakes: then only the speed counts")
+
+    @property
+    def heading(self) -> str:
+        """Heading of its column."""
+        return self.short or self.title
+
+    one_target = field_validator("repeats")(_one_target)
+
+
+class SettingSpec(OverrideSpec):
+    """A setting of what all controllers share, such as brakes, in which conditions are judged again."""
+
+    title: str = Field(min_length=1, description="Its words")
+    conditions: list[str] = Field([], description="Keys of `conditions`; default: `setting_conditions`")
 
 
 class EntrySpec(StrictModel):
@@ -141,6 +172,11 @@ class RankingSpec(StrictModel):
     every: int = Field(1, ge=1, description="Take every n-th amplitude, counted from the last")
     cars: dict[str, CarSpec] = Field(min_length=1, description="Name -> car")
     conditions: dict[str, ConditionSpec] = Field(min_length=1, description="Name -> condition")
+    ordinary: dict[str, OrdinarySpec] = Field({}, description="Name -> ordinary driving")
+    settings: dict[str, SettingSpec] = Field({}, description="Name -> setting of what all controllers share")
+    setting_conditions: list[str] = Field(
+        [], description="Conditions that settings judge again; default: all"
+    )
     entries: dict[str, EntrySpec] = Field({}, description="Name -> controller")
     more_entries: list[str] = Field([], description="Files of entries, relative to this one")
     threat_file: str = Field(
@@ -155,9 +191,21 @@ class RankingSpec(StrictModel):
                 raise ValueError(
                     f"conditions.{name}.car: there is no car {condition.car!r}; there are {known}"
                 )
+        for place, names, there in self._named():
+            for name in names:
+                if name not in there:
+                    raise ValueError(f"{place}: there is no {name!r}; there are {', '.join(there)}")
         if not self.entries and not self.more_entries:
             raise ValueError("has no entries")
         return self
+
+    def _named(self) -> Iterator[tuple[str, list[str], Iterable[str]]]:
+        """Yield place, names and those known, of lists of cars and conditions."""
+        yield "setting_conditions", self.setting_conditions, self.conditions
+        for key, setting in self.settings.items():
+            yield f"settings.{key}.conditions", setting.conditions, self.conditions
+        for key, ordinary in self.ordinary.items():
+            yield f"ordinary.{key}.cars", ordinary.cars, self.cars
 
 
 SERIES, SLOW = "sine-with-dwell", "slowly-increasing-steer"
@@ -185,6 +233,7 @@ class LoadedRanking(LoadedFile):
     entries: dict[str, tuple[EntrySpec, Path]]  # name -> controller, base folder of its path
     quick: bool = False  # only the last amplitude, and only quick conditions
     chosen: tuple[str, ...] = ()  # selected conditions; empty: all
+    setting: str = ""  # key of the setting; "": as the file has it
 
     @cached_property
     def conditions(self) -> dict[str, ConditionSpec]:
@@ -233,7 +282,20 @@ class LoadedRanking(LoadedFile):
     def changes_of_condition(self, name: str) -> tuple[Override, ...]:
         """Return the overrides that a condition makes in its scenario."""
         condition = self.spec.conditions[name]
-        return self.changes(self.spec.cars[condition.car], condition)
+        setting = [self.spec.settings[self.setting]] if self.setting else []
+        return self.changes(self.spec.cars[condition.car], condition, *setting)
+
+    @property
+    def whole(self) -> bool:
+        """Whether all is driven: no quick look, and no selected conditions."""
+        return not self.quick and not self.chosen
+
+    def under(self, setting: str) -> LoadedRanking:
+        """Return the last amplitude of the conditions that a setting judges again, "": the ranking's own."""
+        spec = self.spec
+        own = spec.settings[setting].conditions if setting else []
+        chosen = own or spec.setting_conditions or [*spec.conditions]
+        return replace(self, setting=setting, chosen=tuple(chosen), quick=True)
 
 
 @reads("ranking file", ScenarioError)

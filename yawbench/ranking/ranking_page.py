@@ -28,6 +28,8 @@ from yawbench.studies.experiment_result import Each
 from yawbench.studies.jobs import STEP_TIME
 from yawbench.studies.tables import Table
 
+from .choosing import choosing_table
+from .nuisance import nuisance_sentence, nuisance_table
 from .ranking import SERIES, EntrySpec
 from .ranking_scores import (
     IDLE,
@@ -48,16 +50,19 @@ from .ranking_tables import (
     place_words,
     row_of,
     runs_table,
+    share_text,
     sign_of,
     spread,
     state_words,
     table_of,
     words_of,
 )
-from .threat_runs import published_result
+from .settings import entries_table, settings_sentence, settings_table
+from .threat_runs import ThreatResult, published_result
 from .threat_scores import scored
+from .threat_tables import told_apart
 from .threats import load_threats
-from .threats_page import told_apart
+from .whole import WholeRanking
 
 STATES = {
     RankedState.PASSED: "passed",
@@ -88,6 +93,7 @@ class MatrixRow:
     title: str
     passed: str
     interval: str
+    braking: str | None  # None: ordinary driving is not driven
     share: str
     cells: Sequence[MatrixCell]
 
@@ -110,7 +116,8 @@ class RankingPage(Page):
     rule: str = RULE
     quick: bool  # whether it is a quick look
     missing: Sequence[str]  # controllers without a place
-    first: Sequence[str] = ("place", "controller", "passed", "95 %", "runs")
+    first: Sequence[str]
+    beside: Sequence[Table]  # choosing a law, settings, nuisance
     conditions: Sequence[tuple[str, str]]  # short and whole title
     rows: Sequence[MatrixRow]  # of the matrix
     first_cell: str  # key of the cell that is shown first
@@ -145,7 +152,7 @@ class CellPart(Part):
     worst: str  # which is its worst run
 
 
-def ranking_page(ranked: RankingResult, folder: Path, command: str, each: Each = map) -> str:
+def ranking_page(ranked: WholeRanking, folder: Path, command: str, each: Each = map) -> str:
     """Return the page as HTML, and write a side file for every cell: its numbers and its worst run.
 
     Args:
@@ -172,6 +179,8 @@ def ranking_page(ranked: RankingResult, folder: Path, command: str, each: Each =
         quick=ranking.quick,
         missing=[score.spec.title for score in ranked.scores if score.missing],
         conditions=[(condition.heading, condition.title) for condition in ranking.conditions.values()],
+        first=["place", "controller", "passed", "95 %", *(["braking"] if ranked.nuisance else []), "runs"],
+        beside=beside_matrix(ranked),
         rows=_rows(ranked, digits),
         first_cell=_id(lost),
         frame=embedded(None, "run"),
@@ -186,7 +195,7 @@ def ranking_page(ranked: RankingResult, folder: Path, command: str, each: Each =
     return render(view)
 
 
-def answer(ranked: RankingResult) -> str:
+def answer(ranked: WholeRanking) -> str:
     """Return the result in sentences: who can be told apart, and what the first and no control pass."""
     number = len(ranked.ranking.conditions)
     placed = [score for score in ranked.scores if score.place]
@@ -208,10 +217,36 @@ def answer(ranked: RankingResult) -> str:
     else:
         is_best = "is best" if len(first) == 1 else "are best"
         result = f"Of {counted(whole, 'controller')}, {names} {is_best}: {best} passed{rest}."
+    first_of_all = settings_sentence(ranked.settings)
+    ordinary = nuisance_sentence(ranked.nuisance) if ranked.nuisance else ""
     surely = apart_sentence(apart_by_conditions(placed), [score.spec.fmu == IDLE for score in placed])
     quoted = ranked.ranking.spec.threat_file
     threats = result_of_threats(ranked.ranking.path.parent / quoted) if quoted else ""
-    return " ".join(filter(None, (result, surely, threats)))
+    return " ".join(filter(None, (first_of_all, result, surely, ordinary, threats)))
+
+
+def beside_matrix(ranked: WholeRanking) -> list[Table]:
+    """Return the tables beside the matrix: choosing a law, other settings, nuisance; none of a quick look."""
+    tables = []
+    if ranked.nuisance:
+        quoted = ranked.ranking.spec.threat_file
+        tables.append(
+            choosing_table(ranked, _published(ranked.ranking.path.parent / quoted) if quoted else None)
+        )
+    if ranked.settings:
+        tables += [settings_table(ranked.settings), entries_table(ranked.settings)]
+    if ranked.nuisance:
+        tables.append(nuisance_table(ranked.nuisance))
+    return tables
+
+
+def _published(file: Path) -> ThreatResult | None:
+    """Return the published levels of a threat file; None without any."""
+    if not file.is_file():
+        return None
+    with suppress(ScenarioError):
+        return published_result(load_threats(file))
+    return None
 
 
 def result_of_threats(file: Path) -> str:
@@ -236,7 +271,7 @@ def _image(file: Path, title: str) -> FigureImage | None:
     return image_of(file, title) if file.is_file() else None
 
 
-def _rows(ranked: RankingResult, digits: Digits) -> list[MatrixRow]:
+def _rows(ranked: WholeRanking, digits: Digits) -> list[MatrixRow]:
     """Return the rows of the matrix."""
     sharing = Counter(score.place for score in ranked.scores)
     rows = []
@@ -250,6 +285,7 @@ def _rows(ranked: RankingResult, digits: Digits) -> list[MatrixRow]:
                 title=score.spec.title,
                 passed=passed if score.place else f"{score.missing} missing",
                 interval=interval_words(score) or "–",
+                braking=(share_text(score.braking) or "–") if ranked.nuisance else None,
                 share=str(row_of(score, digits)["runs"]) if score.place else "–",
                 cells=[
                     MatrixCell(_id(cell), cell.state.value, sign_of(cell)) for cell in score.cells.values()

@@ -1,4 +1,4 @@
-"""Tables and figures of a ranking: controllers, conditions and runs; stability over intervention."""
+"""Tables of a ranking: controllers, conditions and runs, and the words in their cells."""
 
 from __future__ import annotations
 
@@ -9,38 +9,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from yawbench.figures.display import digits_of, shown
-from yawbench.figures.style import QUIET, frame, literal, new_figure
-from yawbench.foundation.errors import ResultsError
-from yawbench.foundation.messages import counted, in_text, listed
+from yawbench.foundation.messages import counted
 from yawbench.metrics.expressions import MetricValue
 from yawbench.proving_ground.sine_with_dwell import percent
 from yawbench.studies.jobs import STEP_TIME
 from yawbench.studies.tables import Cell, Column, Table, column
 
 from .ranking_scores import Digits, EntryScore, RankedRun, RankedState, RankingCell, deciding_digits
-from .threat_scores import ComparedGains, GainsAndLaws, Spread
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from yawbench.studies.confidence import ConfidenceInterval, ToldApart
 
     from .ranking_scores import RankingResult
-    from .threat_runs import ThreatResult
-
-
-COLOURS = {
-    RankedState.PASSED: "#BFE5D8",
-    RankedState.SPUN: "#F7E3A1",
-    RankedState.FAILED: "#F6CDB4",
-    RankedState.MISSING: "#FFFFFF",
-}
-"""Colours of cells, which their text also tells apart."""
-TUNED = {"authors": ("o", "#0072B2"), "tuned": ("D", "#D55E00")}
-FIRST_SEED = "1"
-"""Seed of the tuned entries of a ranking itself."""
-ROW = 0.235
-"""Height of a row of the matrix [inch]."""
 
 
 def sign_of(cell: RankingCell) -> str:
@@ -95,96 +75,6 @@ def apart_sentence(apart: ToldApart, idle: Sequence[bool]) -> str:
     )
 
 
-def draw_matrix(ranked: RankingResult, note: str) -> Figure:
-    """Draw which controller passes which condition: a row per controller, best at the top."""
-    from matplotlib.patches import Patch, Rectangle
-
-    rows = ranked.scores
-    conditions = ranked.ranking.conditions
-    wide = len(conditions)
-    digits = deciding_digits(rows)
-    beside = ((-5.1, "right", "place"), (wide + 0.15, "left", "passed"), (wide + 2.05, "right", "runs"))
-    with new_figure() as figure:
-        axes = figure.subplots()
-        for i, score in enumerate(rows):
-            for k, name in enumerate(conditions):
-                cell = score.cells[name]
-                colour = COLOURS[cell.state]
-                axes.add_patch(Rectangle((k, i), 1, 1, facecolor=colour, edgecolor="white", linewidth=1.2))
-                axes.text(k + 0.5, i + 0.52, sign_of(cell), ha="center", va="center", fontsize=7.5)
-            axes.text(-0.15, i + 0.52, literal(score.spec.title), va="center", ha="right", fontsize=8.5)
-            counted = (
-                f"{score.count(RankedState.PASSED)} of {wide}" if score.place else f"{score.missing} missing"
-            )
-            share = shown(score.share, "%", digits=digits.share) if score.place else ""
-            for (x, side, _), text in zip(beside, (place_words(score), counted, share), strict=True):
-                weight = "bold" if x < 0 else "normal"
-                axes.text(x, i + 0.52, text, va="center", ha=side, fontsize=8, weight=weight)
-        for k, spec in enumerate(conditions.values()):
-            axes.text(k + 0.35, -0.15, literal(spec.heading), rotation=40, va="bottom", fontsize=8)
-        for x, side, text in beside:
-            axes.text(x, -0.15, text, ha=side, va="bottom", fontsize=8, color=QUIET)
-        axes.set(xlim=(-5.5, wide + 2.2), ylim=(len(rows) + 0.1, -4.2))
-        axes.set_axis_off()
-        handles = [
-            Patch(facecolor=COLOURS[RankedState.PASSED], label="passed: all runs pass"),
-            Patch(
-                facecolor=COLOURS[RankedState.SPUN], label="spun: criteria met, but more than 20° of sideslip"
-            ),
-            Patch(facecolor=COLOURS[RankedState.FAILED], label="failed; runs that pass of all"),
-        ]
-        frame(figure, ROW * (len(rows) + 4.3), handles, ranked.ranking.spec.title, note)
-    return figure
-
-
-def draw_pareto(ranked: RankingResult, note: str) -> Figure:
-    """Draw stability over intervention: a point per controller, the Pareto front as a line.
-
-    Controllers that never act are listed in the note, since they lie far from all others.
-
-    Raises:
-        ResultsError: there is no controller to draw.
-    """
-    every = [
-        (1e-3 * x, y, score)
-        for score in ranked.scores
-        if (x := score.mean("intervention")) is not None and (y := score.mean("headroom")) is not None
-    ]
-    points = [point for point in every if point[2].mean("effort")]
-    left_out = [f"{score.spec.title}: {y:.0f} points" for _, y, score in every if not score.mean("effort")]
-    if not points:
-        raise ResultsError(
-            "nothing to draw: no controller that acts has all of its runs.", code="nothing-to-draw"
-        )
-    front = [
-        point
-        for point in sorted(points, key=lambda point: point[:2])
-        if not any(x <= point[0] and y >= point[1] and (x, y) != point[:2] for x, y, _ in points)
-    ]
-    with new_figure() as figure:
-        axes = figure.subplots()
-        for x, y, score in points[::-1]:
-            marker, colour = TUNED[score.spec.gains]
-            axes.plot(
-                [x], [y], marker, color=colour, markersize=13, zorder=3, markeredgecolor="white",
-                label=f"gains: {score.spec.gains}",
-            )  # fmt: skip
-            axes.text(
-                x, y, str(score.rank), color="white", fontsize=7, weight="bold", ha="center", va="center",
-                zorder=3,
-            )  # fmt: skip
-        best = [x for x, *_ in front], [y for _, y, _ in front]
-        axes.plot(*best, color=QUIET, linewidth=1.0, zorder=1, label="none is better in both:")
-        for _, _, score in front:
-            axes.plot([], [], " ", label=f"{score.rank}  {score.spec.title}")
-        axes.set_xlabel("Intervention: ∫|torque| dt of the wheel that gets most, once steered, mean [kN·m·s]")
-        axes.set_title("Headroom: percentage points below the limits, least of each condition, mean")
-        handles = {str(line.get_label()): line for line in axes.get_lines()}
-        title = "Stability over intervention; numbers are ranks in the order"
-        frame(figure, 4.9, list(handles.values()), title, " · ".join([*left_out, note]))
-    return figure
-
-
 def degrees(amplitude: float) -> str:
     """Return an amplitude in degrees, to a tenth."""
     return f"{math.degrees(abs(amplitude)):.1f}°"
@@ -222,6 +112,11 @@ def spread(confidence: ConfidenceInterval | None, words: Callable[[float], str])
     )
 
 
+def share_text(share: float | None) -> str | None:
+    """Return a share in per cent."""
+    return None if share is None else f"{100.0 * share:.0f} %" if share >= 0.095 else f"{100.0 * share:.1f} %"
+
+
 def row_of(score: EntryScore, digits: Digits) -> dict[str, Cell]:
     """Return the row of a controller: heading -> cell; `digits`: of the numbers that decide places."""
     slip = score.mean("sideslip")
@@ -238,6 +133,7 @@ def row_of(score: EntryScore, digits: Digits) -> dict[str, Cell]:
         "gains": score.spec.gains,
         "passed": str(score.count(RankedState.PASSED)),
         "95 % interval": interval_words(score),
+        "braking": share_text(score.braking),
         "spun": str(score.count(RankedState.SPUN)),
         "runs": shown(score.share, "%", digits=digits.share),
         **means,
@@ -255,7 +151,19 @@ def table_of(ranked: RankingResult, *left_out: str) -> Table:
     digits = deciding_digits(ranked.scores)
     rows = [row_of(score, digits) for score in ranked.scores]
     kept = [heading for heading in rows[0] if heading not in left_out]
-    texts = ("place", "passed", "95 % interval", "spun", "runs", "headroom", "sideslip", "time per step")
+    if all(score.braking is None for score in ranked.scores):
+        kept.remove("braking")
+    texts = (
+        "place",
+        "passed",
+        "95 % interval",
+        "braking",
+        "spun",
+        "runs",
+        "headroom",
+        "sideslip",
+        "time per step",
+    )
     numbers = {kept.index(heading) for heading in texts if heading in kept}
     cells = [[row[heading] for heading in kept] for row in rows]
     return Table(ranked.ranking.spec.title, kept, [*cells], [RULE], numbers)
@@ -314,6 +222,7 @@ def columns_of_entries(ranked: RankingResult) -> Table:
             _counts("passed", (score.count(RankedState.PASSED) for score in rows)),
             _numbers("passed_low", "1", (score.bounds and score.bounds.low for score in rows)),
             _numbers("passed_high", "1", (score.bounds and score.bounds.high for score in rows)),
+            _numbers("braking", "1", (score.braking for score in rows)),
             _counts("spun", (score.count(RankedState.SPUN) for score in rows)),
             _counts("missing", (score.missing for score in rows)),
             _numbers("share", "1", (None if score.missing else score.share for score in rows)),
@@ -367,79 +276,3 @@ def columns_of_runs(ranked: RankingResult) -> Table:
             _text("key", (run.job and run.job.key for run in runs)),
         ]
     )
-
-
-def gains_table(result: ThreatResult, compared: ComparedGains) -> Table:
-    """Return the table of spreads, in per cent of a threat's range, a group of laws per pair of columns."""
-    threats = result.threats
-    groups = compared.groups.values()
-    parts = {
-        "between seeds of the search, within a law": [gains.seeds for gains in groups],
-        "between the studies' and tuned gains, within a law": [gains.gains for gains in groups],
-        "between laws, means of both gains": [gains.between for gains in groups],
-        "the third less the fourth": [gains.difference for gains in groups],
-    }
-
-    def cells(spreads: Sequence[Spread], factor: float = 1.0) -> list[str | None]:
-        """Return the value and the interval of each spread."""
-        numbers = [[factor * x for x in (spread.value, *spread.bounds)] for spread in spreads]
-        return [text for x, low, high in numbers for text in (f"{x:.1f}", f"{low:.1f} to {high:.1f}")]
-
-    between = [cell for gains in groups for cell in (f"{100.0 * gains.laws:.1f}", None)]
-    rows = [["between laws, tuned", *between]]
-    rows += [[words, *cells(spreads, 100.0)] for words, spreads in parts.items()]
-    rows.append(["ratio of the first to the second", *cells([gains.ratio for gains in groups])])
-    headings = ["standard deviation of the mean level, % of a range"]
-    for title in compared.groups:
-        headings += [title, "95 % interval"]
-    seeds = 1 + len(threats.spec.settings[compared.setting].seeds)
-    searched = threats.threats_in(compared.setting), threats.cars_in(compared.setting), seeds
-    notes = [
-        f"Threats: {', '.join(searched[0])}; cars: {', '.join(searched[1])}; {searched[2]} seeds of the "
-        "search. Intervals hold on these threats and cars: those of seeds and of the ratio are exact if laws "
-        "and seeds are samples of normal distributions, the others of a jackknife over laws, which holds the "
-        "truth in 80 to 97 % of samples of so few. The first two are components of variance."
-    ]
-    return Table("", headings, [*rows], notes, {*range(1, len(headings))})
-
-
-def gains_sentence(result: ThreatResult, compared: ComparedGains) -> str:
-    """Return whether gains matter more than laws, and laws more than the luck of their search."""
-    titles = {name: spec.title for name, (spec, _) in result.threats.ranking.entries.items()}
-    return " ".join(
-        _gains_of_group(title, gains, [in_text(titles[compared.laws[title][k]]) for k in gains.resting])
-        for title, gains in compared.groups.items()
-    )
-
-
-def _gains_of_group(title: str, gains: GainsAndLaws, resting: Sequence[str]) -> str:
-    low, high = gains.difference.bounds
-    if low > 0.0:
-        verdict = "gains matter more than laws: the interval of the difference is above zero"
-    elif high < 0.0:
-        verdict = "laws matter more than gains: the interval of the difference is below zero"
-    else:
-        verdict = (
-            "whether gains matter more than laws is undecided: the interval of the difference holds zero"
-        )
-    if resting:
-        verdict += f", but it rests on the study gains of {listed(resting)}, without which it is not"
-    ratio = gains.ratio
-    luck = (
-        "more than the luck of the search" if ratio.bounds.low > 0.0 else "no more than the search's luck may"
-    )
-    times = f"{ratio.value:.1f} times ({ratio.bounds.low:.1f} to {ratio.bounds.high:.1f})"
-    by = f"F({gains.degrees[0]}, {gains.degrees[1]}) = {gains.f:.1f}"
-    return f"Among {title}, {verdict}; tuned alike, laws vary {luck} ({by}), {times} as much as seeds of it."
-
-
-def seeds_table(result: ThreatResult, compared: ComparedGains) -> Table:
-    """Return the table of mean levels of each law with the gains of its study and of every seed."""
-    threats = result.threats
-    seeds = [FIRST_SEED, *threats.spec.settings[compared.setting].seeds]
-    headings = ["mean level, % of a range", "study", *(f"seed {seed}" for seed in seeds)]
-    rows = [
-        [threats.ranking.entries[law][0].title, *(f"{100 * mean:.1f}" for mean in means)]
-        for law, means in compared.means.items()
-    ]
-    return Table("", headings, [*rows], numbers={*range(1, len(headings))})

@@ -28,13 +28,10 @@ import numpy as np
 
 from yawbench.studies import derived
 from yawbench.studies.confidence import (
-    TAIL,
     Bounds,
     ToldApart,
     crossed_interval,
     crossed_probability,
-    holm,
-    jackknife,
     shared_places,
     told_apart,
 )
@@ -42,9 +39,6 @@ from yawbench.studies.tables import Table, column
 
 from .threat_runs import ThreatResult
 from .threats import REFERENCE
-
-FEWEST = 3
-"""Laws of which a spread is taken; chosen: fewer say nothing about laws."""
 
 
 def mean_positions(positions: np.ndarray) -> np.ndarray:
@@ -227,107 +221,6 @@ def moves_between(before: Mapping[str, float], after: Mapping[str, float], refer
     )
 
 
-class Spread(NamedTuple):
-    """A standard deviation of mean positions, or a ratio of two, with its interval."""
-
-    value: float
-    bounds: Bounds
-
-
-@dataclass(frozen=True)
-class GainsAndLaws:
-    """Spread of the mean positions by gains and by laws, on the threats and cars that were driven.
-
-    `laws`, `seeds`: of laws tuned with several seeds, the standard deviation between laws and that of the
-    luck of the search within them, components of variance; `ratio`: laws / seeds, whose interval lies above 0
-    if laws differ by more than that luck, as the test by F = `f`, with `degrees` of freedom, says. `gains`:
-    between authors' and tuned gains of a law; `between`: between the means of laws over both. `difference`:
-    gains - between; gains matter more than laws if its interval is above 0. It rests on the laws `resting`:
-    without these, which gain most by tuning, it is not above 0 any more; empty if it never is.
-    """
-
-    laws: float
-    seeds: Spread
-    ratio: Spread
-    f: float
-    degrees: tuple[int, int]
-    gains: Spread
-    between: Spread
-    difference: Spread
-    resting: tuple[int, ...]
-
-
-def gains_and_laws(tuned: np.ndarray, authors: np.ndarray) -> GainsAndLaws:
-    """Compare spreads of laws, seeds of their search, and gains.
-
-    Args:
-        tuned: mean positions of law and seed.
-        authors: mean positions of laws, with the authors' gains.
-
-    Laws are a sample of those that could be compared, threats and cars are those driven. The intervals of
-    seeds and ratio are exact for normally distributed laws and seeds, the others of a jackknife over laws.
-    """
-    laws, seeds = tuned.shape
-    means, within = tuned.mean(axis=1), tuned.var(axis=1, ddof=1)
-
-    def spreads(some: np.ndarray) -> np.ndarray:
-        of_gains = math.sqrt(float((0.5 * (means[some] - authors[some]) ** 2).mean()))
-        both = float((0.5 * (means + authors)[some]).var(ddof=1)) - 0.25 * float(within[some].mean()) / seeds
-        of_laws = math.sqrt(max(0.0, both))
-        return np.array([of_gains, of_laws, of_gains - of_laws])
-
-    def over(some: np.ndarray) -> list[Spread]:
-        values, halves = jackknife(lambda chosen: spreads(some[chosen]), len(some))
-        pairs = zip(map(float, values), map(float, halves), strict=True)
-        return [Spread(value, Bounds(value - half, value + half)) for value, half in pairs]
-
-    of_gains, between, difference = over(np.arange(laws))
-    by_gain = np.argsort(-np.abs(means - authors), kind="stable")
-    resting: tuple[int, ...] = ()
-    if difference.bounds.low > 0.0:
-        left_out = (n for n in range(1, laws - 2) if over(np.sort(by_gain[n:]))[2].bounds.low <= 0.0)
-        resting = tuple(int(k) for k in by_gain[: next(left_out, 0)])
-    ratio, f = ratio_of_spreads(tuned)
-    of_seeds = spread_within(tuned)
-    return GainsAndLaws(
-        ratio.value * of_seeds.value if of_seeds.value else float(means.std(ddof=1)),
-        of_seeds, ratio, f, (laws - 1, laws * (seeds - 1)), of_gains, between, difference, resting,
-    )  # fmt: skip
-
-
-def spread_within(groups: np.ndarray) -> Spread:
-    """Return the standard deviation within groups, shape (groups, n), with its interval by chi square."""
-    from scipy.special import chdtri
-
-    degrees = groups.shape[0] * (groups.shape[1] - 1)
-    value = math.sqrt(float(groups.var(axis=1, ddof=1).mean()))
-    low, high = (value * math.sqrt(degrees / float(chdtri(degrees, tail))) for tail in (TAIL, 1.0 - TAIL))
-    return Spread(value, Bounds(low, high))
-
-
-def ratio_of_spreads(groups: np.ndarray) -> tuple[Spread, float]:
-    """Return the standard deviation between groups over that within them, with its interval, and F.
-
-    Components of variance of a balanced one-way analysis: F is the mean square between groups over that
-    within, (1 + n ratio^2) times a number that follows the F distribution.
-
-    Args:
-        groups: n numbers of each; shape (groups, n).
-
-    Source: S. R. Searle, G. Casella, C. E. McCulloch, Variance Components, Wiley 1992.
-    """
-    from scipy.special import fdtri  # what scipy.stats.f uses, without its slow import
-
-    number, n = groups.shape
-    within = float(groups.var(axis=1, ddof=1).mean())
-    if within == 0.0:
-        return Spread(math.inf, Bounds(math.inf, math.inf)), math.inf
-    observed = n * float(groups.mean(axis=1).var(ddof=1)) / within
-    quantiles = fdtri(number - 1, number * (n - 1), [1.0 - TAIL, TAIL])
-    value, low, high = (math.sqrt(max(0.0, observed / q - 1.0) / n) for q in (1.0, *map(float, quantiles)))
-    return Spread(value, Bounds(low, high)), observed
-
-
 def scored(result: ThreatResult, setting: str = "") -> ScoreTable:
     """Return the scores of a setting, by default the main one."""
     setting = setting or result.threats.main
@@ -359,63 +252,3 @@ def compared_setting(result: ThreatResult, setting: str) -> ComparedSetting:
     mains = result.positions(threats.main, entries, like=setting)
     moved = float(np.nanmean(result.positions(setting, entries) - mains))
     return ComparedSetting(scored(result, setting), score_table(entries, mains, REFERENCE), moved)
-
-
-@dataclass(frozen=True)
-class ComparedGains:
-    """Gains and laws by a setting whose laws were tuned with several seeds.
-
-    Attributes:
-        setting: its name.
-        means: law, by its entry with the studies' gains -> mean position with these, and with each seed.
-        groups: title of a group of laws -> spreads; all laws first.
-        laws: title of a group -> its laws, in the order of its spreads.
-        helped: law -> probability of a difference as large between its tuned gains, means over seeds, and
-            those of the study, if they are alike: first taken alone, then corrected for the number of laws.
-            Only laws whose tuned gains are better.
-    """
-
-    setting: str
-    means: dict[str, list[float]]
-    groups: dict[str, GainsAndLaws]
-    laws: Mapping[str, Sequence[str]]
-    helped: dict[str, tuple[float, float]]
-
-
-def compared_gains(result: ThreatResult) -> ComparedGains | None:
-    """Compare gains and laws by the setting with seeds; None if there is none with all levels."""
-    threats = result.threats
-    setting = next((name for name, described in threats.spec.settings.items() if described.seeds), None)
-    if setting is None:
-        return None
-    spec, entries = threats.spec.settings[setting], threats.ranking.entries
-    tuned = {
-        name: [
-            other
-            for other in result.complete[setting]
-            if entries[other][0].fmu == entries[name][0].fmu and entries[other][0].gains == "tuned"
-        ]
-        for name in result.complete[threats.main]
-        if entries[name][0].gains == "authors"
-    }
-    laws = {name: others for name, others in tuned.items() if len(others) == 1 + len(spec.seeds)}
-    groups = {f"all {len(laws)} laws": [*laws], **spec.groups}
-    tuned_positions = {name: result.positions(setting, others) for name, others in laws.items()}
-    studies = {name: result.positions(threats.main, [name], like=setting) for name in laws}
-    means = {
-        name: [float(x) for x in mean_positions(np.concatenate([studies[name], tuned_positions[name]]))]
-        for name in laws
-    }
-    kept = {title: names for title, names in groups.items() if len(names) >= FEWEST and {*names} <= {*laws}}
-    compared = {}
-    for title, names in kept.items():
-        table = np.array([means[name] for name in names])
-        compared[title] = gains_and_laws(table[:, 1:], table[:, 0])
-    gained = {name: tuned_positions[name].mean(axis=0) - studies[name][0] for name in laws}
-    alone = [crossed_probability(table) for table in gained.values()]
-    helped = {
-        name: both
-        for name, both in zip(laws, zip(alone, holm(alone), strict=True), strict=True)
-        if np.nanmean(gained[name]) > 0.0
-    }
-    return ComparedGains(setting, means, compared, kept, helped) if compared else None
