@@ -12,7 +12,7 @@ No friction is told. mu_s is what the measured lateral acceleration shows, from 
 
 A car that follows its driver thus keeps the friction of a dry road; one that is asked for more than it gives
 has shown its limit. In a turn on a bank the accelerometer shows less than the tyres give; the margin covers
-0.1 g, a bank of 6 degrees.
+0.15 g, a bank of 8 degrees.
 
 Source: that the intended yaw rate is limited by the measured lateral acceleration: A. T. van Zanten, R. Erhardt,
 G. Pfaff, VDC, the vehicle dynamics control system of Bosch, SAE 950759, 1995, and Bosch's Automotive Handbook
@@ -47,7 +47,7 @@ class EscReferenceParameters(SingleTrackParameters):
         1.0, "1", "Largest friction mu_0, assumed until the car shows less", "chosen: a dry road", minimum=0.1
     )
     friction_margin: float = parameter(
-        0.1,
+        0.15,
         "1",
         "Friction beyond that in use which the driver may ask for",
         "chosen: model error, bank",
