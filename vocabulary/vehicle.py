@@ -130,6 +130,23 @@ CAR: dict[str, VehicleQuantity] = {
     "roll_camber_rear": VehicleQuantity(
         "1", "Roll camber of the rear axle: inclination of its wheels over the body's roll angle"
     ),
+    "roll_steer_front": VehicleQuantity(
+        "1",
+        "Roll steer of the front axle, positive out of the turn: steer of its wheels over the body's roll angle",
+    ),
+    "roll_steer_rear": VehicleQuantity(
+        "1",
+        "Roll steer of the rear axle, positive into the turn: steer of its wheels over the body's roll angle",
+    ),
+    "steer_compliance_front": VehicleQuantity(
+        "rad/N", "Steer by which the front wheels yield to the side force of their axle", minimum=0.0
+    ),
+    "steer_compliance_rear": VehicleQuantity(
+        "rad/N", "Steer by which the rear wheels yield to the side force of their axle", minimum=0.0
+    ),
+    "tyre_relaxation_length": VehicleQuantity(
+        "m", "Distance over which the slip angle of the tyres' side force lags; 0: none", minimum=0.0
+    ),
     "steering_ratio": VehicleQuantity(
         "1", "Hand-wheel angle over road-wheel angle", minimum=0.1, plausible=(1, 40)
     ),

@@ -34,6 +34,7 @@ from .plane_body import Motion
 from .road_plane import INPUTS as ROAD_PLANE
 from .road_plane import LEVEL, Pull, pull_of
 from .wheel_kinematics import Eight, slip_angle, slip_ratio, wheel_velocities
+from .wheel_steer import WheelYieldParameters, Yielding
 from .wheel_spin import spin
 
 MOTION = (
@@ -65,8 +66,8 @@ DRIVEN_WHEELS = (*WHEEL_SLIPS, "wheel_speed_*", *of_steered_wheels("wheel_veloci
 
 
 @dataclass(frozen=True)
-class StartParameters:
-    """Initial motion of a car, and the reference speed of slip at low speed."""
+class StartParameters(WheelYieldParameters):
+    """Initial motion of a car, the reference speed of slip at low speed, and how wheels yield."""
 
     initial_sideslip: float = parameter(0.0, "rad", "Sideslip angle at the start", "chosen: none")
     initial_yaw_rate: float = parameter(0.0, "rad/s", "Yaw rate at the start", "chosen: none")
@@ -101,6 +102,7 @@ class Car(Component):
     end: tuple[float, float]
     loads: Four
     pull: Pull = LEVEL
+    yielding: Yielding | None
     of_plane: ClassVar[slice | None]
     """Indices of the inputs of road and wind; None without them."""
 
@@ -149,6 +151,10 @@ class Car(Component):
         self.carried = Carried(carried)
         self.wheels = self.wheel_velocities()
         self.start_wheels()
+        self.yielding = None
+        if p.steer_compliance_front or p.steer_compliance_rear or p.tyre_relaxation_length:
+            self.yielding = Yielding(p)
+            self.yielding.begin(self.steered_angles())
         self.finish(carried)
 
     def advance(self, t: float, h: float, u: list[float]) -> None:
@@ -165,6 +171,8 @@ class Car(Component):
         self.wheels = self.wheel_velocities()
         self.finish(self.carried.to_end(h, carried))
         self.turn_wheels(h, v, loads, signals)
+        if self.yielding:
+            self.yielding.advance(h, signals[2], self.steered_angles(), self.wheels[:4])
 
     def output(self, t: float, u: list[float]) -> tuple[float, ...]:
         return (*self.motion_values(), *self.wheel_values())
@@ -179,6 +187,11 @@ class Car(Component):
 
     def wheel_values(self) -> tuple[float, ...]:
         """Return the values of the wheels' outputs."""
+        angles = self.yielding.angles if self.yielding else self.steered_angles()
+        return (*angles, *self.rolling_values())
+
+    def steered_angles(self) -> Four:
+        """Return the slip angles [rad] of wheels that do not yield to side force."""
         low = self.p.low_speed
         v_fl, v_fr, v_rl, v_rr, side_fl, side_fr, side_rl, side_rr = self.wheels
         return (
@@ -186,7 +199,6 @@ class Car(Component):
             slip_angle(v_fr, side_fr, low),
             slip_angle(v_rl, side_rl, low),
             slip_angle(v_rr, side_rr, low),
-            *self.rolling_values(),
         )
 
     def start_wheels(self) -> None:

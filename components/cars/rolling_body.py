@@ -18,10 +18,13 @@ from .published_cars import PaperB
 from .resistance import ResistanceParameters, drag_of
 from .road_plane import LEVEL, Pull
 from .roll_camber import RollCamberParameters
+from .wheel_steer import RollSteerParameters
 
 
 @dataclass(frozen=True)
-class RollingCarParameters(StartParameters, RollCamberParameters, ResistanceParameters, PaperB):
+class RollingCarParameters(
+    StartParameters, RollCamberParameters, RollSteerParameters, ResistanceParameters, PaperB
+):
     """The car of paper B, table 1."""
 
     sprung_mass: float = of_car(1110.0, "paper B, table 1", text="Sprung mass m_s")

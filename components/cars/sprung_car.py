@@ -10,10 +10,13 @@ from .published_cars import PaperA, PaperC
 from .resistance import ResistanceParameters
 from .ride import Ride
 from .roll_camber import RollCamberParameters
+from .wheel_steer import RollSteerParameters
 
 
 @dataclass(frozen=True)
-class FourteenDofParameters(StartParameters, RollCamberParameters, ResistanceParameters, PaperC):
+class FourteenDofParameters(
+    StartParameters, RollCamberParameters, RollSteerParameters, ResistanceParameters, PaperC
+):
     """Large saloon; values from paper C, table 1, where it has them."""
 
     sprung_mass: float = of_car(1650.0, "paper C, table 1", text="Sprung mass m_s", minimum=1.0)

@@ -13,7 +13,7 @@ left side up, and X, Y_f, Y_r, M are the resultants of the tyre forces (`cars.pl
 angle of the sprung mass; v_x, v_y, a_x, a_y refer to the point of the roll axis below the centre of mass,
 which the paper calls the centre of mass. (1) and (4) are solved for a_y and ddphi exactly. Lifted wheels:
 `cars.load_transfer`. Inclines and wind: `cars.road_plane`. Camber for tyre models that use it:
-`cars.roll_camber`.
+`cars.roll_camber`. Roll steer, off by default: `cars.wheel_steer`.
 
 Ours differs: rolling resistance is a moment on each wheel (`cars.resistance`), whereas the paper has a force
 m g f on the body in (2). Free wheels slow the car equally; with driven wheels the tyre forces are smaller by
@@ -33,10 +33,13 @@ wheels by `cars.wheel_spin`.
 from collections.abc import Sequence
 from typing import Any
 
+from yawbench.vocabulary.wheels import Four
+
 from ..cars.car import DRIVEN_WHEELS, MOTION, DrivenCar
 from ..cars.plane_body import move, resultants
 from ..cars.roll_camber import inclinations
 from ..cars.rolling_body import RollingBody, RollingCarParameters
+from ..cars.wheel_steer import steer_by_travel
 from ..mathematics.carry import Values
 from ..mathematics.oscillator import transition
 
@@ -99,6 +102,18 @@ class EightDof(DrivenCar):
         pull = self.pull
         self.end = self.body.accelerations(held, pull=pull, v_x=v_x, v_y=v_y, r=r, phi=phi, dphi=dphi)
         self.loads = self.body.vertical_loads(held, pull=pull, phi=phi, dphi=dphi)
+
+    def steered_angles(self) -> Four:
+        angles = super().steered_angles()
+        p = self.p
+        if not (p.roll_steer_front or p.roll_steer_rear):
+            return angles
+        half = 0.5 * p.track_width
+        travel = -half * self.angle  # of the left wheels
+        fl, fr = steer_by_travel(travel, -travel, half, coefficient=p.roll_steer_front)
+        rl, rr = steer_by_travel(travel, -travel, half, coefficient=-p.roll_steer_rear)
+        a_fl, a_fr, a_rl, a_rr = angles
+        return a_fl - fl, a_fr - fr, a_rl - rl, a_rr - rr
 
     def output(self, t: float, u: list[float]) -> tuple[float, ...]:
         return (

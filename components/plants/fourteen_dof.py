@@ -12,11 +12,12 @@ of the contact points, which move with body and wheels (`cars.contact_points`).
 The model replaces a multi-body model. Degrees of freedom and assumptions as in T. Shim, C. Ghike,
 Understanding the limitations of different vehicle models for roll dynamics studies, Vehicle System
 Dynamics 45(3), 2007, 191-216: rigid body, vertical wheel travel, linear springs and dampers at the
-wheels, no bump stops, no roll steer. Ours differs: vertical yaw axis, roll and pitch to second order in the
+wheels, no bump stops. Ours differs: vertical yaw axis, roll and pitch to second order in the
 kinetic energy, roll centres as slopes of the wheels' paths. Wheels have the body's horizontal motion at
 `unsprung_height`; no anti-dive. Derivation: docs/plant_fourteen_dof.md. Rollover, beyond 45 degrees of roll
 or pitch, is an error. Drag acts at the centre of mass, rolling resistance at the wheels (`cars.resistance`).
-Wheels incline with the body (`cars.roll_camber`), for tyre models with camber.
+Wheels incline with the body (`cars.roll_camber`), for tyre models with camber; roll and bump steer, off by
+default, follow the wheel travel (`cars.wheel_steer`).
 
 Coupling: vertical loads follow from the tyre springs, that is from the state, so there is no loop of loads
 and forces. Only the slips and longitudinal velocities of the front wheels depend directly on an input; tyre
@@ -30,6 +31,8 @@ from collections.abc import Sequence
 from math import degrees, pi
 from typing import Any
 
+from yawbench.vocabulary.wheels import Four
+
 from ..cars.car import DRIVEN_WHEELS, MOTION, DrivenCar
 from ..cars.contact_points import contact, contact_velocities
 from ..cars.plane_body import move
@@ -38,6 +41,7 @@ from ..cars.ride import AT_REST, RESOLVED, loads, move_ride
 from ..cars.roll_camber import inclinations
 from ..cars.sprung_car import FourteenDofParameters, ride_of
 from ..cars.wheel_kinematics import Eight
+from ..cars.wheel_steer import steer_by_travel
 from ..fmi.variables import output
 from ..mathematics.carry import Values
 
@@ -114,6 +118,22 @@ class FourteenDof(DrivenCar):
         """Return the velocities [m/s] of the contact points in wheel axes, longitudinal and lateral."""
         v_x, v_y, r = self.motion[:3]
         return contact_velocities(v_x, v_y, r, self.body, delta=self.steer_angle, ride=self.ride, p=self.p)
+
+    def steered_angles(self) -> Four:
+        angles = super().steered_angles()
+        p = self.p
+        if not (p.roll_steer_front or p.roll_steer_rear):
+            return angles
+        ride = self.ride
+        half = ride.half_track
+        z, phi, theta, u_fl, u_fr, u_rl, u_rr = self.body[:7]
+        front, rear, side = z - ride.a * theta, z + ride.b * theta, half * phi
+        fl, fr = steer_by_travel(
+            u_fl - front - side, u_fr - front + side, half, coefficient=p.roll_steer_front
+        )
+        rl, rr = steer_by_travel(u_rl - rear - side, u_rr - rear + side, half, coefficient=-p.roll_steer_rear)
+        a_fl, a_fr, a_rl, a_rr = angles
+        return a_fl - fl, a_fr - fr, a_rl - rl, a_rr - rr
 
     def _accelerations(self, x: float, y: float, v_x: float) -> tuple[float, float]:
         """Return a_x, a_y [m/s2] from the tyre forces [N] and the speed [m/s]."""

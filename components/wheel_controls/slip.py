@@ -11,31 +11,13 @@ Source: paper B, equations (31)-(38).
 """
 
 from dataclasses import dataclass
-from typing import Any
 
+from ..control_laws.known_tyre import ANY_FORCE, TYRES, KnownTyreParameters
 from ..control_laws.slip_control import SlipControlParameters, wheel_torque
 from ..fmi.component import Component
-from ..fmi.variables import output, parameter
+from ..fmi.variables import output
 from ..tyre_models.slip_curve import slip_for_force
-from ..tyre_models.tyre import Curve, Tyre
-from ..tyres.dugoff import Dugoff
-from ..tyres.linear import LinearTyre
-from ..tyres.magic_formula import MagicFormula
-from ..tyres.magic_formula_62 import MagicFormula62
-from ..tyres.magic_formula_1987 import MagicFormula1987
-
-TYRES: dict[str, type[Tyre]] = {
-    "magic_formula": MagicFormula,
-    "magic_formula_1987": MagicFormula1987,
-    "magic_formula_62": MagicFormula62,
-    "dugoff": Dugoff,
-    "linear": LinearTyre,
-}
-"""Tyre models available to the slip control."""
-
-
-ANY_FORCE = 1e6
-"""More than any tyre gives [N], so that what is asked for is the limit of the slip."""
+from ..tyre_models.tyre import Curve
 
 
 def slip_share(kappa: float, curve: Curve, share: float) -> float:
@@ -45,20 +27,9 @@ def slip_share(kappa: float, curve: Curve, share: float) -> float:
     return abs(kappa / slip_for_force(most, force, first=first, cap=1.0, share=share))
 
 
-OF_TYRES: Any = tuple(tyre.CurveParameters for tyre in TYRES.values())
-
-
 @dataclass(frozen=True)
-class SlipParameters(SlipControlParameters, *OF_TYRES):  # type: ignore[misc]  # as many bases as tyres
+class SlipParameters(SlipControlParameters, KnownTyreParameters):
     """Parameters of the slip control and of all tyre models; only those of the selected model are used."""
-
-    tyre: str = parameter(
-        "magic_formula",
-        None,
-        "Tyre model",
-        "chosen: the tyre of paper B",
-        choices=tuple(TYRES),
-    )
 
 
 class Slip(Component):
