@@ -1,25 +1,24 @@
 """Hydraulics of a stability control: one pump for all wheels, calipers, valves, accumulator, pre-charge.
 
-    volume of a caliper       V(P) = V_0 (1 - exp(-P / P_0)) + V_1 P / P_1                 P_1 = 10 MPa
-    its pressure              V'(P) dP/dt = Q_in - Q_out
-    a valve                   Q = Q_1 sqrt(dP / P_1), dP from its high to its low side, never back
-    inlet, from the master cylinder       dP = P_m - P, while P_m > P
-    inlet, from the pump                  dP = P_l - P, with P_l such that the wheels take what the pump gives:
-                                          sum(Q_in) = Q_p w,   P_l at most that of the pressure relief valve
-    outlet                                dP = P - P_a, into the accumulator
-    accumulator               P_a = P_s (1 + V_a / V_s),   dV_a/dt = sum(Q_out) - what the pump returns
-    pump                      T_w dw/dt = 1 - w while it runs; without an open inlet it empties the accumulator
-    pre-charge                the booster applies P_c with a lag; the pump draws a share of Q_p without, all with it
+    volume of a caliper    V(P) = V_0 (1 - exp(-P / P_0)) + V_1 P / P_1               P_1 = 10 MPa
+    its pressure           V'(P) dP/dt = Q_in - Q_out
+    a valve                Q = w Q_1 sqrt(dP / P_1)      dP from its high to its low side, w its opening
+    inlet                  dP = max(P_m, P_c, P_l) - P   P_m master cylinder; of a separated wheel also the
+                                                         pre-charge P_c and the line behind the pump P_l
+    pump                   sum(Q_in) = Q_p s at P_l, which is at most that of the relief valve;
+                           s rises within its lag; without pre-charge the pump draws a share of Q_p
+    outlet                 dP = P - P_a, into the accumulator
+    accumulator            P_a = P_s (1 + V_a / V_s),    dV_a/dt = sum(Q_out) - what the pump returns
 
-V_0 is the volume of clearances, seals and pads' first deflection, V_1 that of caliper and pads per 10 MPa. The line
-pressure P_l distributes the flow: wheels with less pressure get more, and one that is nearly full cannot take it from
-others. Flow is in turn limited by orifices, so a single small caliper rises by its orifice, large ones by the pump.
+V_0 is the volume of clearances, seals and the first deflection of the pads, V_1 that of caliper and pads. The
+line pressure distributes the flow: a wheel with less pressure gets more. Full, the accumulator takes no more
+than the pump returns. A wheel that is not separated from the driver drains through the check valve of its
+inlet.
 
-An accumulator that is full takes no more than the pump returns, and the outlet's flow then falls with its dP.
-
-Source: structure of hydraulic units with return pump, inlet and outlet valve per wheel, switch-over valve as pressure
-relief valve and low-pressure accumulator: workshop descriptions of ESP units (Mercedes-Benz C-class 1999 and 2000,
-Saab 9-5 2005). The orifice equation is textbook hydraulics. Values: `BrakeHydraulicsParameters`.
+Source: structure of units with return pump, inlet and outlet valve per wheel, switch-over valve as relief
+valve and low-pressure accumulator: workshop descriptions of the Mercedes-Benz C-class, 1999 and 2000, and the
+Saab 9-5, 2005. Orifices and caliper stiffness are textbook hydraulics; no source at hand gives volumes and
+flows, see `BrakeHydraulicsParameters`.
 """
 
 from collections.abc import Sequence
@@ -32,9 +31,9 @@ from ..fmi.variables import parameter
 FULL = 1e7
 """P_1, the pressure [Pa] to which volumes and flows of parameters refer."""
 LONGEST = 0.001
-"""Longest step [s] of the integration: a fifth of the time in which an outlet empties a caliper's clearance."""
+"""Longest step [s] of the integration; chosen: half of it changes pressures by less than 1 %."""
 ENOUGH = 5e5
-"""Pressure [Pa] before the pump with which it draws all of its flow: Mercedes-Benz C 280, 2000, pre-charges 5 bar."""
+"""Pressure [Pa] before the pump with which it draws all of its flow: Mercedes-Benz C 280, 2000."""
 HALVINGS = 40
 """Bisections for the line pressure: to 10 mPa."""
 
@@ -141,7 +140,7 @@ def approach(x: float, target: float, h: float, lag: float) -> float:
 
 
 def line_pressure(flow: float, pressures: Sequence[float], openings: Sequence[float], relief: float) -> float:
-    """Return the pressure [Pa] behind the pump at which the wheels take its flow, at most that of the relief valve.
+    """Return the pressure [Pa] behind the pump at which the wheels take its flow, at most `relief`.
 
     Args:
         flow: of the pump [m3/s].
@@ -239,7 +238,9 @@ class BrakeHydraulics:
         taken = drained = 0.0
         for i, pressure in enumerate(self.pressures):
             self.sources[i] = max(master, self.precharge, line) if boosted[i] else master
-            self.inflows[i] = p.inlet_flow * self.inlets[i] * sqrt(max(self.sources[i] - pressure, 0.0) / FULL)
+            self.inflows[i] = (
+                p.inlet_flow * self.inlets[i] * sqrt(max(self.sources[i] - pressure, 0.0) / FULL)
+            )
             self.outflows[i] = p.outlet_flow * self.outlets[i] * sqrt(max(pressure - stored, 0.0) / FULL)
             if boosted[i] and line == self.sources[i]:
                 taken += self.inflows[i]

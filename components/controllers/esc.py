@@ -1,27 +1,27 @@
-"""Supervisor of a production-like stability control: states with thresholds, moment, cut of the engine's torque.
+"""Supervisor of a production-like stability control: states with thresholds, yaw moment, cut of the engine.
 
-    e_r    = r_ref - r                                       D(x, d): excess of |x| over d, with the sign of x
-    e_beta = D(beta + T_beta dbeta, beta_max)                dbeta = a_y / v - r, smoothed
-    oversteer    the moment opposes the rotation:  M r < 0, or the sideslip and its rate are beyond beta_max
-    understeer   the moment supports it
+    e_r    = r_ref - r                             D(x, d): excess of |x| over d, with the sign of x
+    e_beta = D(beta + T_beta dbeta, beta_max)      dbeta = a_y / v - r, smoothed
+    oversteer      D(e_r) opposes the rotation r, or e_beta is not zero
+    understeer     else
 
-    off -> on    |e_r| > d = r_0 + share |r_ref|, for T_confirm     or |e_beta| > 0, for T_confirm
-    on -> off    |e_r| < release d  and  e_beta = 0, for T_release
-    on           M = k_r D(e_r, release d) + k_beta e_beta,         understeer: k_r times a share
-                 engine reduced by |D(e_r, release d)| / range, falling and recovering at limited rates
+    off -> on      |e_r| > d = r_0 + share |r_ref| or e_beta not zero, for T_confirm
+    on -> off      |e_r| < release d and e_beta zero, for T_release
+    while on       M = k_r D(e_r, release d) + k_beta e_beta,   in understeer with a share of k_r
+                   the engine is cut by |D(e_r, release d)| over a range, at limited rates
 
 Below `full_speed` an intervention fades out, below `release_speed` and in reverse there is none.
-`brake_preparation` is 1 while the error exceeds `preparation_share` of its threshold, and while the control is on,
-so that brakes can be filled before they are needed.
+`brake_preparation` is 1 while |e_r| exceeds `preparation_share` of d, and while the control is on, so that
+brakes can be filled before they are needed.
 
-A positive moment raises the yaw rate and lowers the sideslip. Needs: the intended yaw rate, what a sensor cluster
-measures, and a sideslip angle (an estimator's); its rate is estimated here.
+A positive moment raises the yaw rate and lowers the sideslip. The sideslip angle is an estimator's; its rate
+is estimated here, from what a sensor cluster measures.
 
-Source: A. T. van Zanten, R. Erhardt, G. Pfaff, VDC, the vehicle dynamics control system of Bosch, SAE 950759, 1995
-(states, dead band, engine torque; its parameters are not public); 49 CFR 571.126, S4 and S5.1: brake torques of
-single wheels in a closed loop against oversteer and understeer, yaw rate measured, sideslip or its rate
-estimated, engine torque modified, from 20 km/h on, not in reverse. Chosen: all numbers; docs/esc.md shows what
-they do.
+Source: A. T. van Zanten, R. Erhardt, G. Pfaff, VDC, the vehicle dynamics control system of Bosch, SAE 950759,
+1995, for dead band, states and engine torque; its parameters are not public. 49 CFR 571.126, S4 and S5.1, for
+what such a system has: brake torques of single wheels in a closed loop against oversteer and understeer, yaw
+rate measured, sideslip or its rate estimated, engine torque modified, at work from 20 km/h on, not in
+reverse. Chosen: all numbers; docs/esc.md shows what they do.
 """
 
 from dataclasses import dataclass
@@ -166,7 +166,9 @@ class EscController(Component):
             OFF if not self.on else OVERSTEER if excess * u[1] < 0.0 or foreseen != 0.0 else UNDERSTEER
         )
         wanted = min(abs(excess) / p.engine_range, 1.0) if self.on else 0.0
-        self.reduction = min(max(wanted, self.reduction - p.engine_rise * h), self.reduction + p.engine_fall * h)
+        self.reduction = min(
+            max(wanted, self.reduction - p.engine_rise * h), self.reduction + p.engine_fall * h
+        )
 
     def output(self, t: float, u: list[float]) -> tuple[float, ...]:
         p = self.p
@@ -183,7 +185,8 @@ class EscController(Component):
 
     def _threshold(self, u: list[float]) -> float:
         """Return the yaw-rate error [rad/s] at which an intervention begins."""
-        return self.p.yaw_rate_threshold + self.p.yaw_rate_threshold_share * abs(u[0])
+        threshold: float = self.p.yaw_rate_threshold + self.p.yaw_rate_threshold_share * abs(u[0])
+        return threshold
 
     def _foreseen(self, u: list[float]) -> float:
         """Return the excess [rad] of the sideslip, foreseen, over its bound; none at walking pace."""
@@ -193,4 +196,5 @@ class EscController(Component):
 
     def _rate(self, u: list[float]) -> float:
         """Return the rate of the sideslip [rad/s] that a_y, yaw rate and speed tell."""
-        return u[4] / max(u[3], self.p.release_speed, 0.1) - u[1]
+        slowest: float = max(self.p.release_speed, 0.1)
+        return u[4] / max(u[3], slowest) - u[1]

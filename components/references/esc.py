@@ -14,10 +14,11 @@ A car that follows its driver thus keeps the friction of a dry road; one that is
 has shown its limit. In a turn on a bank the accelerometer shows less than the tyres give; the margin covers
 0.15 g, a bank of 8 degrees.
 
-Source: that the intended yaw rate is limited by the measured lateral acceleration: A. T. van Zanten, R. Erhardt,
-G. Pfaff, VDC, the vehicle dynamics control system of Bosch, SAE 950759, 1995, and Bosch's Automotive Handbook
-(both from memory; neither gives numbers); share: R. Rajamani, Vehicle Dynamics and Control, 2nd edition, section
-8.2 (from memory). Chosen: the filter, its margin and its times, found on runs on friction 0.2 to 0.9.
+Source: that the intended yaw rate is limited by the measured lateral acceleration: A. T. van Zanten, R.
+Erhardt, G. Pfaff, VDC, the vehicle dynamics control system of Bosch, SAE 950759, 1995, and the Automotive
+Handbook of Bosch (from memory, without numbers); the share: R. Rajamani, Vehicle Dynamics and Control, 2nd
+edition, chapter 8 (from memory). Chosen: the filter, its margin and times, by runs on friction 0.2 to 0.9 and
+by sines of 1 to 5 m/s2.
 """
 
 from dataclasses import dataclass
@@ -61,10 +62,10 @@ class EscReferenceParameters(SingleTrackParameters):
         minimum=0.001,
     )
     friction_fall: float = parameter(
-        0.15,
+        0.3,
         "s",
         "Time constant T_fall of falling friction",
-        "chosen: the delay of a car's a_y",
+        "chosen: longer than a car's a_y lags",
         minimum=0.001,
     )
     friction_rise: float = parameter(
@@ -73,7 +74,7 @@ class EscReferenceParameters(SingleTrackParameters):
 
 
 class EscReference(SingleTrack):
-    """Driver's intent from the single-track model, limited by the friction that lateral acceleration shows."""
+    """Driver's intent from the single-track model, limited by what the lateral acceleration shows."""
 
     Parameters = EscReferenceParameters
     inputs = SEEN

@@ -1,53 +1,52 @@
-"""Brakes of a production-like stability control: slip targets, ABS cycles, hydraulics, engine's share, heat.
+"""Brakes of a production-like stability control: slip limits, ABS cycles, hydraulics, engine cut, heat.
 
-    P_m  = -min(F_d, 0) R / (2 (C_f + C_r))         pressure by the driver, whose brake force is F_d
-    P*_i = min(max(-F_i, 0) R / C_i, P_max)         pressure that the request asks of a wheel
-    T_i  = R (1 - cut) max(F_i, 0) - C_i P_i        cut: `engine_reduction`
+    P_m  = -min(F_d, 0) R / (2 (C_f + C_r))        pressure by the driver, whose brake force is F_d
+    P*_i = min(max(-F_i, 0) R / C_i, P_max)        pressure that the request asks of a wheel
+    T_i  = R (1 - cut) max(F_i, 0) - C_i P_i       cut: `engine_reduction`
 
-    slip limit       kappa_max = min(q kappa_opt(alpha, F_z, mu), cap), kappa_opt the tyre's own optimum
-    release          braking slip above kappa_max                     outlet open, inlet closed
-    hold             braking slip above q_hold kappa_max              both closed
-    apply            else, while P_i < P*_i                           inlet open; after a release, in pulses
-    reduce           P_i > P*_i by a tolerance                        outlet open
+    slip limit     kappa_max = q min(kappa_opt(alpha, F_z, mu), cap)        `control_laws.known_tyre`
+    release        braking slip above kappa_max                         outlet open, inlet closed
+    hold           braking slip above q_hold kappa_max                  both closed
+    apply          else, while P_i < P*_i                               inlet open; after a release, in pulses
+    reduce         P_i > P*_i by a tolerance                            outlet open
 
-F_i is the request of the allocator, with the driver's part; a wheel whose P*_i exceeds P_m is separated from the
-driver and supplied by the pump, the others by the master cylinder (`control_laws.brake_hydraulics`). The pump runs,
-and the pre-charge is applied, while a wheel asks for more than the driver gives or `brake_preparation` is 1.
+F_i is the request of the allocator, with the driver's part. A wheel whose P*_i exceeds P_m is separated from
+the driver and supplied by the pump, the others by the master cylinder (`control_laws.brake_hydraulics`). Pump
+and pre-charge are on while a wheel asks for more than the driver gives or `brake_preparation` is 1; the pump
+also empties the accumulator.
 
-The optimum is that of the tyre model at the present slip angle, load and friction, as in `wheel_controls.slip`: 5 to
-20 % straight ahead, more with slip angle (of `saloon75` 29 % at 8 degrees). Production units have it in tables. At
-walking pace slip is meaningless and not limited.
+A wheel may slip up to the optimum of its tyre at the present slip angle, load and friction, which production
+units have in tables: 0.13 straight ahead, 0.29 at 8 degrees (tyre set 1). At walking pace slip is meaningless
+and not limited.
 
-Heat: what a brake takes up, E, cools with a time constant, dE/dt = C P |w| - E / T_E; beyond its limit, or after
-the pump has run for longer than it may, the control brakes no wheel beyond the driver's pressure until E, or the
-pump's running time, has fallen to `recovery_share`.
+Heat: what a brake takes up, E, cools with a time constant, dE/dt = C P |w| - E / T_E. Beyond its limit, or
+after the pump has run for longer than it may, no wheel is braked beyond the driver's pressure until all have
+fallen to `recovery_share` of their limits.
 
-Source: A. T. van Zanten, R. Erhardt, G. Pfaff, SAE 950759, 1995, for wheels held at slip targets by the stability
-control; the three phases of ABS: workshop description of the Saab 9-5, 2005. That brakes are no longer applied when
-they have been for too long: Saab 9-3, 2004 (without its time). Chosen: the tyre's optimum in place of tables; one
-pump for both circuits; heat as energy, with a disc of 8 kg.
+Source: wheels held at slip targets by the stability control: A. T. van Zanten, R. Erhardt, G. Pfaff, SAE
+950759, 1995; the three phases of ABS: workshop description of the Saab 9-5, 2005; brakes that have been
+applied for too long are no longer: that of the Saab 9-3, 2004, without the time. Chosen: the tyre's optimum
+in place of tables, one pump for both circuits, heat as energy of a disc of 8 kg.
 """
 
 from dataclasses import dataclass
 from math import exp
 
 from ..control_laws.brake_hydraulics import BrakeHydraulics, BrakeHydraulicsParameters
+from ..control_laws.known_tyre import TYRES, KnownTyreParameters, optimum_slip
 from ..fmi.component import Component
 from ..fmi.variables import like, output, parameter, signal
-from ..tyre_models.slip_curve import slip_for_force
-from ..tyre_models.tyre import Curve
 from .hydraulic import HydraulicParameters
-from .slip import ANY_FORCE, OF_TYRES, TYRES, SlipParameters
+from .slip import SlipParameters
 
 APPLY, HOLD, RELEASE = 0.0, 1.0, 2.0
 """Values of `valve_state_*`."""
 
 
 @dataclass(frozen=True)
-class EscBrakeParameters(BrakeHydraulicsParameters, *OF_TYRES):  # type: ignore[misc]  # as many bases as tyres
-    """Parameters of brakes, slip limits, cycles and heat, and of all tyre models, of which one is selected."""
+class EscBrakeParameters(BrakeHydraulicsParameters, KnownTyreParameters):
+    """Parameters of brakes, slip limits, cycles and heat, and of the tyres that it knows."""
 
-    tyre: str = like(SlipParameters, "tyre")
     wheel_radius: float = like(HydraulicParameters, "wheel_radius")
     brake_factor_front: float = like(HydraulicParameters, "brake_factor_front")
     brake_factor_rear: float = like(HydraulicParameters, "brake_factor_rear")
@@ -90,12 +89,6 @@ class EscBrakeParameters(BrakeHydraulicsParameters, *OF_TYRES):  # type: ignore[
     recovery_share: float = parameter(
         0.8, "1", "Share of these limits at which it brakes again", "chosen", minimum=0.0, maximum=1.0
     )
-
-
-def slip_limit(curve: Curve, share: float, cap: float) -> float:
-    """Return the largest braking slip: `share` of the optimum of the tyre's curve, at most `cap`."""
-    force, first = curve
-    return abs(slip_for_force(-ANY_FORCE, force, first=first, cap=cap, share=share))
 
 
 class EscBrakes(Component):
@@ -189,10 +182,12 @@ class EscBrakes(Component):
 
     def _master(self, drive: float) -> float:
         """Return the pressure [Pa] by the driver for his force [N], negative when braking."""
-        return min(max(-drive, 0.0) * self.per_force, self.p.pressure_limit)
+        limit: float = self.p.pressure_limit
+        pressure: float = max(-drive, 0.0) * self.per_force
+        return min(pressure, limit)
 
     def _choose(self, i: int, wanted: float, more: bool, u: list[float]) -> None:
-        """Set the valves of a wheel for the pressure [Pa] that is wanted of it, `more` than the driver's or not."""
+        """Set the valves of a wheel for the pressure [Pa] that is wanted, `more` than the driver's or not."""
         p = self.p
         pressure = self.hydraulics.pressures[i]
         kappa, v = u[4 + i], u[20 + i]
@@ -201,7 +196,8 @@ class EscBrakes(Component):
         state = APPLY
         if pressure > p.pressure_tolerance and abs(v) > p.release_speed:
             curve = TYRES[p.tyre].curve(u[8 + i], u[12 + i], u[24 + i], self.axles[i])
-            limit = self.limits[i] = slip_limit(curve, p.optimum_share, p.slip_cap)
+            limit = p.optimum_share * optimum_slip(curve, driving=v < 0.0, cap=p.slip_cap)
+            self.limits[i] = limit
             if slip > limit:
                 state = RELEASE
             elif slip > p.hold_share * limit:
@@ -220,7 +216,7 @@ class EscBrakes(Component):
         self.outlets[i] = 1.0 if state == RELEASE else 0.0
 
     def _heat(self, h: float, u: list[float]) -> None:
-        """Advance the energies of the brakes and the running time of the pump, and decide what they still may."""
+        """Advance the energies of the brakes and the running time of the pump, and see whether they may."""
         p = self.p
         kept = exp(-h / p.cooling_time)
         for i in range(4):
