@@ -129,6 +129,12 @@ SIGNALS: dict[str, SignalEntry] = {
     "yaw_acceleration_ref": SignalEntry("rad/s2", "Time derivative of yaw_rate_ref"),
     "sideslip_rate_ref": SignalEntry("rad/s", "Time derivative of sideslip_ref"),
     "yaw_moment": SignalEntry("N.m", "Requested yaw moment M_z of the longitudinal wheel forces", "M_z"),
+    "engine_reduction": SignalEntry(
+        "1", "Share of the driver's driving force that stability control takes from the engine", minimum=0.0
+    ),
+    "brake_preparation": SignalEntry(
+        "1", "1 while brakes are to be filled because an intervention is near or on, else 0", minimum=0.0
+    ),
     "force_request_*": SignalEntry(
         "N", "Requested longitudinal tyre force, wheel axes", "F_x", "Requested longitudinal force"
     ),

@@ -7,23 +7,27 @@ with dr = r - r_ref: oversteer brakes the outer front wheel, understeer the inne
 wheel supplies the whole moment through its own arm, F = -|M / arm|; at delta = 0 that is 2 |M| / d. The
 driver's force is added unchanged.
 
-The rule ignores the requested moment, so it may choose a wheel that turns the car the other way. Three
+The rule ignores the requested moment, so it may choose a wheel that turns the car the other way. Four
 readings:
 
     printed     brake the wheel of the rule, whatever the sign of M
     guarded     brake it only if its moment has the sign of M
     moment      replace dr by -M: the side follows the moment, the axle the driving state
+    rotation    replace dr by -M and delta by r: a moment against the car's rotation brakes the outer front
+                wheel, one that supports it the inner rear wheel, also while the driver steers against a slide
+
+`other_wheel_share` of the moment comes from the other wheel of the same side.
 
 Straight ahead, delta = 0, the printed rule brakes a front wheel on one side but a rear wheel on the other.
-`guarded` and `moment` choose the front wheel on both: a driver who does not steer requests no turn, so any
+The other readings choose the front wheel on both: a driver who does not steer requests no turn, so any
 yaw rate is oversteer, and left and right are treated alike.
 
 Dead band with hysteresis: braking begins when |M| and |dr| both exceed their thresholds, and ends when
 either falls below `release_share` of its threshold.
 
 Source: paper C, table 3, equations (7)-(9). Erratum: (7)-(9) share the moment between two wheels, which would
-give the single wheel of section 2.3 only half. Ours differs: the true arm, the guard, straight ahead, the
-dead band.
+give the single wheel of section 2.3 only half. Ours differs: the true arm, the guard, the rotation, the other
+wheel, straight ahead, the dead band.
 """
 
 from dataclasses import dataclass
@@ -36,9 +40,8 @@ from ..control_laws.moment_sharing import NO_FORCE, share_moment
 from ..fmi.variables import like, output, parameter
 
 FL, FR, RL, RR = range(4)
-ONE_WHEEL: tuple[Four, ...] = (
-    (1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0, 1.0),
-)  # fmt: skip
+BEHIND = (RL, RR, FL, FR)
+"""The other wheel of the same side."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +55,15 @@ class SingleWheelParameters:
         None,
         "Reading of the rule",
         "chosen: guarded, brake only a wheel whose moment has the sign of M",
-        choices=("printed", "guarded", "moment"),
+        choices=("printed", "guarded", "moment", "rotation"),
+    )
+    other_wheel_share: float = parameter(
+        0.0,
+        "1",
+        "Share of the moment from the other wheel of the side",
+        "paper C: a single wheel",
+        minimum=0.0,
+        maximum=1.0,
     )
     moment_threshold: float = parameter(
         200.0, "N.m", "Moment above which a wheel is braked", "chosen", minimum=0.0
@@ -80,14 +91,20 @@ def chosen_wheel(delta: float, dr: float, *, printed: bool = False) -> int:
     return RR if dr > 0.0 else FL
 
 
-def brake_forces(moment: float, wheel: int, *, guarded: bool, arms: Four, least_arm: float) -> Four:
+def brake_forces(
+    moment: float, wheel: int, *, guarded: bool, arms: Four, least_arm: float, other_share: float = 0.0
+) -> Four:
     """Return the longitudinal forces [N] that brake `wheel` for `moment` [N.m].
 
     Args:
         guarded: brake only if that gives a moment of the sign of `moment`.
         arms, least_arm: as in `share_moment` [m].
+        other_share: share of the moment from the other wheel of the side [1].
     """
-    forces = share_moment(moment, ONE_WHEEL[wheel], arms, least_arm)
+    weights = [0.0, 0.0, 0.0, 0.0]
+    weights[wheel] = 1.0 - other_share
+    weights[BEHIND[wheel]] = other_share
+    forces = share_moment(moment, (weights[0], weights[1], weights[2], weights[3]), arms, least_arm)
     if forces[wheel] <= 0.0:
         return forces
     if guarded:
@@ -116,8 +133,16 @@ class SingleWheel(Allocator):
         moment, _, delta, r, r_ref = u
         choice = self.p.wheel_choice
         printed = choice == "printed"
-        wheel = chosen_wheel(delta, -moment if choice == "moment" else r - r_ref, printed=printed)
-        return brake_forces(moment, wheel, guarded=not printed, arms=arms, least_arm=self.least_arm)
+        dr = -moment if choice in ("moment", "rotation") else r - r_ref
+        wheel = chosen_wheel(r if choice == "rotation" else delta, dr, printed=printed)
+        return brake_forces(
+            moment,
+            wheel,
+            guarded=not printed,
+            arms=arms,
+            least_arm=self.least_arm,
+            other_share=self.p.other_wheel_share,
+        )
 
     def _decide(self, u: list[float]) -> None:
         p = self.p

@@ -7,6 +7,7 @@ the start.
 """
 
 from dataclasses import dataclass
+from typing import Any, ClassVar
 
 from ..fmi.component import Component
 from ..fmi.variables import output, parameter, signal
@@ -28,7 +29,7 @@ class RateParameters:
 class Reference(Component):
     """Base class of references, which derive the desired motion from the steer angle."""
 
-    inputs = ("steer_angle", "velocity_x", signal("friction", start=1.0))
+    inputs: ClassVar[Any] = ("steer_angle", "velocity_x", signal("friction", start=1.0))
     outputs = tuple(output(name, *SEEN) for name in SHOWN)
 
     def begin(self, u: list[float]) -> tuple[float, float]:

@@ -116,7 +116,7 @@ SPLIT = {
     **dict.fromkeys(("plant_seven_dof", "plant_two_dof"), 1e-4),
     "plant_eight_dof": 2e-4,
     "plant_fourteen_dof": 2e-3,
-    **dict.fromkeys(("reference_single_track", "reference_steady_state"), 0.2),
+    **dict.fromkeys(("reference_esc", "reference_single_track", "reference_steady_state"), 0.2),
 }
 """Largest difference of two half steps from a whole one, over the range of the output; else rounding.
 

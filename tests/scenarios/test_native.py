@@ -24,6 +24,7 @@ RUNS = {
     "proving_ground/side_wind_gust": ("5 ms", {}),
     "proving_ground/sine_sweep": ("5 ms", {"controller": "controller_lqr"}),
     "proving_ground/sine_with_dwell": ("5 ms", {}),
+    "proving_ground/sine_with_dwell_esc": ("5 ms", {}),
     "real_signals/monitored_lane_change": ("1 ms", {"sensor": "sensor_poor"}),
     "real_signals/parity_lane_change": ("1 ms", {}),
     "real_signals/single_sine": ("5 ms", {"estimator": "estimator_kinematic", "sensor": "sensor_ideal"}),
