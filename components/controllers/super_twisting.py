@@ -41,7 +41,7 @@ class SuperTwistingParameters:
     square_root_factor: float = parameter(
         1.5, "1", "Gain of the square root over sqrt(L)", "Levant 1998", minimum=0.0
     )
-    integral_factor: float = parameter(1.1, "1", "Gain of the integral over L", "Levant 1998", minimum=0.0)
+    integral_factor: float = parameter(1.1, "1", "Gain of the integral over L", "Levant 1998", minimum=1e-6)
     yaw_inertia: float = like(SurfaceParameters, "yaw_inertia")
     moment_limit: float = like(SurfaceParameters, "moment_limit")
     fade_speed: float = like(SurfaceParameters, "fade_speed")
