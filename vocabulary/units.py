@@ -25,6 +25,7 @@ UNITS: dict[str, dict[str, int]] = {
     "s2/rad": {"s": 2, "rad": -1},
     "rad/s": {"rad": 1, "s": -1},
     "rad/s2": {"rad": 1, "s": -2},
+    "rad/s3": {"rad": 1, "s": -3},
     "Hz": {"s": -1},
     "kg": {"kg": 1},
     "kg.m2": {"kg": 1, "m": 2},

@@ -20,6 +20,18 @@ class PaperA:
 
 
 @dataclass(frozen=True)
+class PaperASingleTrack:
+    """The car of paper A as a linear single-track model, which several controllers know."""
+
+    mass: float = like(PaperA, "mass")
+    yaw_inertia: float = like(PaperA, "yaw_inertia")
+    cg_to_front_axle: float = like(PaperA, "cg_to_front_axle")
+    cg_to_rear_axle: float = like(PaperA, "cg_to_rear_axle")
+    cornering_stiffness_front: float = of_car(100000.0, "paper A, table 1, two tyres")
+    cornering_stiffness_rear: float = of_car(100000.0, "paper A, table 1, two tyres")
+
+
+@dataclass(frozen=True)
 class PaperB:
     """The car of paper B, table 1, with four driven wheels."""
 

@@ -12,26 +12,19 @@ A baseline, not from a paper. The limit is applied after the law, so a limited m
 
 from dataclasses import dataclass
 
-from ..cars.published_cars import PaperA
+from ..cars.published_cars import PaperASingleTrack
 from ..cars.single_track_car import SingleTrackCar
 from ..control_laws.linear_feedback import error_dynamics, optimal_gains
 from ..control_laws.moment_limit import LimitParameters, limit
 from ..fmi.component import Component
 from ..fmi.variables import like, output, parameter
-from ..references.steady_state import SteadyStateParameters
 from .pid import SEEN
 
 
 @dataclass(frozen=True)
-class LqrParameters:
+class LqrParameters(PaperASingleTrack):
     """Parameters of the single-track car, weights (as values of equal cost) and limits."""
 
-    mass: float = like(PaperA, "mass")
-    yaw_inertia: float = like(PaperA, "yaw_inertia")
-    cg_to_front_axle: float = like(PaperA, "cg_to_front_axle")
-    cg_to_rear_axle: float = like(PaperA, "cg_to_rear_axle")
-    cornering_stiffness_front: float = like(SteadyStateParameters, "cornering_stiffness_front")
-    cornering_stiffness_rear: float = like(SteadyStateParameters, "cornering_stiffness_rear")
     sideslip_scale: float = parameter(
         0.02,
         "rad",

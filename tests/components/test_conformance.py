@@ -95,6 +95,7 @@ ODD = {
     *wheels("inclination_angle_*"),
     *wheels("patch_slip_angle_*"),
     *("bank", "wind_force_y", "wind_moment_z", "yaw_moment_wanted", "implied_sideslip"),
+    "estimated_sideslip",
 }
 """Signals that change their sign in a mirror; all others keep it."""
 LOPSIDED = {("asymmetric_terms", True), ("table_reading", "printed"), ("wheel_choice", "printed")}

@@ -31,6 +31,11 @@ RUNS = {
     "real_signals/told_fnn": ("1 ms", {}),
     "road/split_braking": ("5 ms", {}),
     "tyre_file/lane_change": ("1 ms", {"tyre": "tyre_magic_formula_62_transient"}),
+    "feedforward_pi/step_steer": ("2.5 ms", {}),
+    "fuzzy_sliding_mode/low_friction": ("1 ms", {"controller": "controller_super_twisting"}),
+    "proving_ground/sine_with_dwell_motors": ("2.5 ms", {"controller": "controller_integral_sliding_mode"}),
+    "proving_ground/slow_ramp": ("5 ms", {"controller": "controller_internal_model"}),
+    "proving_ground/step_steer": ("5 ms", {"controller": "controller_lqg"}),
     "one_car/steady_turn": ("2 ms", {"tyre": "tyre_magic_formula_62"}),
 }  # fmt: skip
 """Scenario -> the largest step size that all its units take, and swaps; every native unit takes part."""
