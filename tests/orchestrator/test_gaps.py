@@ -13,7 +13,7 @@ from tests.command_line import status_of
 from yawbench.figures.display import LabelledRun
 from yawbench.figures.plots import spans_of
 from yawbench.foundation.errors import ScenarioError
-from yawbench.measured_cars.fit import load_fit
+from yawbench.measured_cars.fit_file import load_fit
 from yawbench.measured_cars.flaws import FlawKind, flaws_of
 from yawbench.measured_cars.single_track import effects_in
 from yawbench.orchestrator.recordings.gaps import gaps_in

@@ -95,12 +95,12 @@ def drive(
     is resumed; finished runs are not repeated.
     """
     from yawbench.orchestrator.results.folder_names import default_folder
-    from yawbench.orchestrator.scenario import loader
+    from yawbench.orchestrator.scenario import catalogue
     from yawbench.studies.driven_tests import TestDriver
 
     chosen = DRIVEN[test]
     changes = (*_vehicle(vehicle), *options.changes)
-    one_run = loader.find(scenario or f"{GROUND}/{str(test).replace('-', '_')}", "a scenario")
+    one_run = catalogue.find(scenario or f"{GROUND}/{str(test).replace('-', '_')}", "a scenario")
     folder = options.out or default_folder(one_run, changes, suffix="_series")
     execute = context.with_resource(executor_of(folder, str(one_run), options, format="parquet"))
     if (angle or slow_steer) and not chosen.needs_angle:
@@ -110,7 +110,7 @@ def drive(
             why = "set by the series itself"
             raise ScenarioError(f"{change.target}: {why}", code="option-invalid")
     steer = f"{GROUND}/slowly_increasing_steer"
-    slow = loader.find(slow_steer or steer, "a scenario") if chosen.needs_angle else None
+    slow = catalogue.find(slow_steer or steer, "a scenario") if chosen.needs_angle else None
     hold(context, folder)
     known = None
     if slow:
@@ -152,8 +152,8 @@ def _vehicle(name: str | None) -> tuple[Override, ...]:
         ScenarioError: the file does not exist.
     """
     from yawbench.orchestrator.plan import Override
-    from yawbench.orchestrator.scenario import loader
+    from yawbench.orchestrator.scenario import catalogue
 
     if name is None:
         return ()
-    return (Override.of("vehicle", str(loader.find(name, "a vehicle file").resolve()), "--vehicle"),)
+    return (Override.of("vehicle", str(catalogue.find(name, "a vehicle file").resolve()), "--vehicle"),)

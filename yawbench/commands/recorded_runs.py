@@ -45,14 +45,14 @@ def recorded(sources: Sequence[Path], options: RunOptions) -> list[Path]:
     from yawbench.orchestrator.results.folder_names import default_folder
     from yawbench.orchestrator.results.freshness import staleness
     from yawbench.orchestrator.results.measurement_results import is_measurement, segments_of
-    from yawbench.orchestrator.scenario import loader
-    from yawbench.orchestrator.scenario.loader import MEASUREMENT
+    from yawbench.orchestrator.scenario import catalogue
+    from yawbench.orchestrator.scenario.catalogue import MEASUREMENT
     from yawbench.planner import Planner
     from yawbench.studies.jobs import Job, execute, ready
 
-    sources = [path if os.path.exists(path) else loader.named(path) or path for path in sources]
-    files = [path for path in sources if path.suffix in loader.ENDINGS and not os.path.isdir(path)]
-    scenarios = [path for path in files if loader.kind_of(path) != MEASUREMENT]
+    sources = [path if os.path.exists(path) else catalogue.named(path) or path for path in sources]
+    files = [path for path in sources if path.suffix in catalogue.ENDINGS and not os.path.isdir(path)]
+    scenarios = [path for path in files if catalogue.kind_of(path) != MEASUREMENT]
     if options.changes and not scenarios:
         raise ScenarioError(
             "--swap, --set and --fault apply to scenarios, not to results folders",

@@ -174,7 +174,7 @@ def fit(context: typer.Context, file: FitFile, options: RunOptions) -> None:
     from yawbench.orchestrator.results.folder_names import default_folder
     from yawbench.planner import Planner
 
-    from .fit import load_fit
+    from .fit_file import load_fit
     from .fit_page import fit_page, parameter_table, score_table
     from .fit_result import make_fit
     from .least_squares import CONVERGED
@@ -209,7 +209,7 @@ def vehicle_text(result: FitResult, folder: Path, planner: Planner) -> str:
 
     from yawbench.orchestrator.signal_names import Target
 
-    from .fit import MEASURED
+    from .fit_file import MEASURED
 
     fit, model = result.fit, result.scenario
     scenario = planner.load(fit.scenario)

@@ -40,7 +40,7 @@ from yawbench.metrics.verdict import Verdict, apart, compare, not_judged, worded
 from yawbench.orchestrator.recordings.measurement import Measurement
 from yawbench.orchestrator.recordings.segment import Segment
 from yawbench.orchestrator.results.reader import Results
-from yawbench.orchestrator.scenario import loader, yaml_lines
+from yawbench.orchestrator.scenario import catalogue, yaml_lines
 from yawbench.orchestrator.scenario.quantities import convert
 from yawbench.orchestrator.scenario.schema_validation import StrictModel, validated
 from yawbench.orchestrator.scenario.yaml_lines import Document
@@ -138,7 +138,7 @@ def load_bands(name: str | Path) -> Bands:
     Raises:
         ScenarioError: there is no such file, or it is invalid; lists all errors.
     """
-    path = loader.find(name, "a file of bands")
+    path = catalogue.find(name, "a file of bands")
     document = yaml_lines.read(path, what="file of bands")
     spec = validated(BandsSpec, document)
     tolerances = {name: _tolerance(document, name, tolerance) for name, tolerance in spec.bands.items()}
