@@ -92,8 +92,8 @@ def evaluate(
     `yawbench drive`, its runs and its A are taken, and its evaluation is kept: this one goes to a folder
     evaluated in it. Exit status 1 if nothing could be judged.
     """
+    from yawbench.measurements.measured_results import load_run
     from yawbench.orchestrator.results.folder_names import below_results
-    from yawbench.orchestrator.results.measurement_results import load_run
     from yawbench.proving_ground.trace import trace_of
 
     from .recorded_runs import distinct, folder_of_all
@@ -191,7 +191,7 @@ class EvaluatedRuns:
 
 def _runs(source: Path) -> list[Path]:
     """Return the folders of the runs in and below a folder, or the segments of a measurement file."""
-    from yawbench.orchestrator.results.measurement_results import segments_of
+    from yawbench.measurements.measured_results import segments_of
     from yawbench.orchestrator.results.reader import found_runs
     from yawbench.orchestrator.results.run_record import RunStatus
 
@@ -290,7 +290,7 @@ def angle_of(text: str | None) -> float | None:
 
 def _angle(text: str | None, slow_steer: list[Path] | None, test: StandardTest) -> float | None:
     """Return A [rad], None if it is neither given nor needed."""
-    from yawbench.orchestrator.results.measurement_results import load_run
+    from yawbench.measurements.measured_results import load_run
     from yawbench.proving_ground.steering_tests import characteristic_angle, evaluate_slow_steer
     from yawbench.proving_ground.trace import trace_of
 

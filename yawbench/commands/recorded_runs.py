@@ -42,9 +42,9 @@ def recorded(sources: Sequence[Path], options: RunOptions) -> list[Path]:
         ScenarioError: a scenario or an option is invalid.
     """
     from yawbench.fmus.opener import stale_fmus
+    from yawbench.measurements.measured_results import is_measurement, segments_of
     from yawbench.orchestrator.results.folder_names import default_folder
     from yawbench.orchestrator.results.freshness import staleness
-    from yawbench.orchestrator.results.measurement_results import is_measurement, segments_of
     from yawbench.orchestrator.scenario import catalogue
     from yawbench.orchestrator.scenario.catalogue import MEASUREMENT
     from yawbench.planner import Planner
@@ -106,8 +106,8 @@ def labels_of(folders: Sequence[Path], labels: Sequence[str] | None) -> list[str
 
 def folder_of_all(folders: Sequence[Path]) -> Path:
     """Return the folder for figures of all runs: that of a single run, else their common parent."""
+    from yawbench.measurements.measured_results import is_measurement
     from yawbench.orchestrator.results.folder_names import below_results
-    from yawbench.orchestrator.results.measurement_results import is_measurement
 
     if not (own := [folder for folder in folders if not is_measurement(folder)]):
         return below_results("measured", folders[0].stem)
@@ -154,7 +154,7 @@ def with_segments(folders: Sequence[Path], measured: Sequence[Path] | None) -> l
     Raises:
         ResultsError: a file does not exist.
     """
-    from yawbench.orchestrator.results.measurement_results import segments_of
+    from yawbench.measurements.measured_results import segments_of
 
     return [*folders, *(segment for file in measured or () for segment in segments_of(file))]
 
@@ -169,7 +169,7 @@ def read_runs(places: Sequence[Path], start: float, *, thin: bool = False) -> li
     Raises:
         ResultsError, ScenarioError: one of them cannot be read.
     """
-    from yawbench.orchestrator.results.measurement_results import filtered_alike, is_measurement, load_run
+    from yawbench.measurements.measured_results import filtered_alike, is_measurement, load_run
 
     thin = thin and not any(map(is_measurement, places))
     return filtered_alike([load_run(place, thin=thin, start=start) for place in places])

@@ -33,9 +33,9 @@ from yawbench.fmus.fmu import Value
 from yawbench.foundation.errors import ScenarioError, code_of
 from yawbench.foundation.messages import hint, span
 from yawbench.foundation.safe_files import reads
+from yawbench.measurements.measurement import Measurement, load_measurement
+from yawbench.measurements.segment import Segment
 from yawbench.orchestrator.recordings.gaps import by_signals
-from yawbench.orchestrator.recordings.measurement import Measurement, load_measurement
-from yawbench.orchestrator.recordings.segment import Segment
 from yawbench.orchestrator.scenario import yaml_lines
 from yawbench.orchestrator.scenario.quantities import convert
 from yawbench.orchestrator.scenario.schema import Scalar

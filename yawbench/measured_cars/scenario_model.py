@@ -20,8 +20,8 @@ from yawbench.fmus.fmu import Variable
 from yawbench.foundation.errors import ScenarioError, YawbenchError, text_of
 from yawbench.foundation.messages import hint
 from yawbench.foundation.workers import Pool
+from yawbench.measurements.segment import LowPass
 from yawbench.orchestrator.plan import InputSeries, Instance, Override
-from yawbench.orchestrator.recordings.segment import LowPass
 from yawbench.orchestrator.results.freshness import key_of
 from yawbench.orchestrator.scenario.quantities import gain_and_offset, unit_of
 from yawbench.orchestrator.scenario.schema import SeriesSpec

@@ -35,10 +35,10 @@ from yawbench.figures.style import CHANGED, frame, line_style, new_figure
 from yawbench.foundation.errors import Diagnostic, ResultsError, ScenarioError, code_of, warnings_in
 from yawbench.foundation.messages import counted, hint, resolved
 from yawbench.foundation.safe_files import reads
+from yawbench.measurements.measurement import Measurement
+from yawbench.measurements.segment import Segment
 from yawbench.metrics.measures import words
 from yawbench.metrics.verdict import Verdict, apart, compare, not_judged, worded, worst
-from yawbench.orchestrator.recordings.measurement import Measurement
-from yawbench.orchestrator.recordings.segment import Segment
 from yawbench.orchestrator.results.reader import Results
 from yawbench.orchestrator.scenario import catalogue, yaml_lines
 from yawbench.orchestrator.scenario.quantities import convert
