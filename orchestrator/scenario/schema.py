@@ -58,8 +58,6 @@ if TYPE_CHECKING:
 
 AXLES = ("front", "rear")
 PARAMETERS = "parameters"
-
-
 AlgorithmName = Annotated[str, OneOf(ALGORITHMS)]
 
 

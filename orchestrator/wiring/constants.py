@@ -30,8 +30,6 @@ if TYPE_CHECKING:
     from ..recordings.recording_formats import FileColumn
 
 Input = tuple[str, str]  # instance, variable
-
-
 FACT, INPUTS, CHANGED_FACT, CHANGED_INPUTS = range(4)
 """Levels of precedence, ascending: an overridden fact beats the file, but not other overrides."""
 
@@ -149,8 +147,6 @@ def _of_facts(system: WiringContext) -> Iterator[tuple[Input, Constant]]:
 
 Reader = Callable[[SeriesSpec, str, Variable], InputSeries]
 """Callback: (specification, part matched by the `*` of its key, input) -> time series."""
-
-
 RECORDED = 100
 """Rows from which a file that no measurement file describes counts as recorded. Chosen: fewer are written by
 hand, with times as far apart as a ramp is long."""

@@ -22,14 +22,8 @@ from yawbench.commands.evaluate import DRIVE, EvaluatedRuns, angle_of
 
 GROUND = "proving_ground"
 """Folder of the standard tests' scenarios."""
-
-
 DrivenName = Literal[tuple(DRIVEN)]  # type: ignore[valid-type]
-
-
 TestToDrive = Annotated[DrivenName, typer.Argument(help="The test.", metavar="TEST")]  # type: ignore[valid-type]
-
-
 ScenarioOption = Annotated[
     str | None,
     typer.Option(
@@ -38,8 +32,6 @@ ScenarioOption = Annotated[
         help="Scenario of a single run. Default: that of the test in proving_ground.",
     ),
 ]
-
-
 Slow = Annotated[
     str | None,
     typer.Option(
@@ -48,16 +40,12 @@ Slow = Annotated[
         help="Scenario of slowly increasing steer, for A; default: proving_ground/slowly_increasing_steer.",
     ),
 ]
-
-
 VehicleOption = Annotated[
     str | None,
     typer.Option(
         "--vehicle", metavar="FILE", help="Vehicle file, or a name that `yawbench list vehicles` gives."
     ),
 ]
-
-
 StartAngle = Annotated[
     str | None,
     typer.Option(
@@ -66,8 +54,6 @@ StartAngle = Annotated[
         help="A (hand-wheel angle at 0.3 g), such as '35.8 deg'; default: measured by runs.",
     ),
 ]
-
-
 DriveFigures = Annotated[bool, typer.Option("--figures", help="Also draw every run.")]
 
 

@@ -24,11 +24,7 @@ if TYPE_CHECKING:
 
 
 TestName = Literal[tuple(TESTS)]  # type: ignore[valid-type]
-
-
 TestToEvaluate = Annotated[TestName, typer.Argument(help="The test.", metavar="TEST")]  # type: ignore[valid-type]
-
-
 EvaluatedSources = Annotated[
     list[Path],
     typer.Argument(
@@ -36,25 +32,17 @@ EvaluatedSources = Annotated[
         metavar="RESULTS...",
     ),
 ]
-
-
 SlowSteer = Annotated[
     list[Path] | None,
     typer.Option(
         "--slow-steer", metavar="RESULTS", help="Runs of slowly increasing steer, for A. Repeatable."
     ),
 ]
-
-
 CharacteristicAngle = Annotated[
     str | None,
     typer.Option("--angle", metavar="ANGLE", help="A, the hand-wheel angle at 0.3 g, such as '35.8 deg'."),
 ]
-
-
 EvaluationFigures = Annotated[bool, typer.Option("--figures/--no-figures", help="Draw every run.")]
-
-
 OutFile = Annotated[
     Path | None,
     typer.Option(
@@ -63,15 +51,9 @@ OutFile = Annotated[
         help="Folder for evaluation.json, evaluation.html and figures. Default: that of the runs.",
     ),
 ]
-
-
 FILE, PAGE = "evaluation.json", "evaluation.html"
-
-
 DRIVE, EVALUATE = "drive", "evaluate"
 """Commands that write evaluations; neither replaces those of the other."""
-
-
 BESIDE = "evaluated"
 """Folder of an evaluation below a folder that has one of another command already."""
 

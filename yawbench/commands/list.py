@@ -18,14 +18,8 @@ Wanted = Annotated[
     Literal["runs", "scenarios", "fmus", "vehicles", "signals", "metrics"] | None,
     typer.Argument(help="What to list. Default: scenarios and vehicles.", metavar="WHAT"),
 ]
-
-
 SCENARIOS = ("a scenario", "a study file", "a sweep file")
-
-
 VEHICLES = ("a vehicle file",)
-
-
 ListedFolder = Annotated[
     Path | None,
     typer.Argument(
@@ -34,8 +28,6 @@ ListedFolder = Annotated[
         metavar="PLACE",
     ),
 ]
-
-
 Units = Annotated[
     bool,
     typer.Option("--units", help="List FMUs and whether each runs natively, or why it runs in Python."),

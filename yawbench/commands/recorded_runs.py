@@ -25,8 +25,6 @@ RunSources = Annotated[
         help="Results folders, scenarios or measurement files; several are overlaid.", metavar="RESULTS..."
     ),
 ]
-
-
 Labels = Annotated[
     list[str] | None,
     typer.Option(
@@ -126,8 +124,6 @@ MeasuredRuns = Annotated[
         "too. Repeatable.",
     ),
 ]
-
-
 MeasuredFrom = Annotated[
     str,
     typer.Option("--from", metavar="TIME", help="Time of the measurements at which the runs begin: '12 s'."),

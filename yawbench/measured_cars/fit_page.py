@@ -23,8 +23,6 @@ from yawbench.vocabulary.signals import SIGNALS
 
 BINS = 4
 """Number of ranges of acceleration and speed, equal in samples. Chosen: enough to see a trend."""
-
-
 OVER = ("acceleration_y", "velocity_x")
 
 

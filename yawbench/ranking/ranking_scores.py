@@ -22,7 +22,7 @@ from enum import Enum
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from yawbench.figures.display import digits_apart
 from yawbench.fmus.fmu import Value
@@ -51,9 +51,6 @@ from .ranking import (
     angles_of,
     dwell_experiment,
 )
-
-if TYPE_CHECKING:
-    pass
 
 UNHELD = 1.0
 """Yaw-rate ratio without a second peak after the reversal: the car keeps turning as before."""

@@ -48,8 +48,6 @@ LONGEST = 100
 """Characters of a folder name. Chosen: more do not fit into file names where a letter takes two bytes."""
 _FOLDER = re.compile(rf"[\w.+-]{{1,{LONGEST}}}")
 Texts = TypeVar("Texts", Claim, DerivedSpec)
-
-
 SCENARIOS = Path("scenarios")
 """Folder searched for studies if none is given."""
 
