@@ -231,7 +231,7 @@ def _hash(content: bytes) -> bytes:
 
 OF_RESULTS = (
     *("fmus/fmu.py", "fmus/archive.py", "fmus/description.py", "fmus/opener.py", "fmus/zip_members.py"),
-    *("orchestrator", "vehicles", "vocabulary/facts.py", "planner.py", "tyre_stand.py"),
+    *("orchestrator", "measurements", "vehicles", "vocabulary/facts.py", "planner.py", "tyre_stand.py"),
 )
 """Modules and packages of yawbench on which the results of a run depend; FMUs are hashed separately."""
 OF_METRICS = (*OF_RESULTS, "vocabulary/motion.py", "metrics")

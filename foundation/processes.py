@@ -78,6 +78,12 @@ def die_with_parent(number: int = signal.SIGKILL) -> None:
         ctypes.CDLL(None).prctl(1, number, 0, 0, 0)  # PR_SET_PDEATHSIG of linux/prctl.h
 
 
+def end_copy_of(process: int) -> None:
+    """End this process if it is a copy of that one: an FMU has called `fork` and let the copy return, too."""
+    if os.getpid() != process:
+        os._exit(1)
+
+
 def flush_output() -> None:
     """Flush the standard output streams of Python and C."""
     for stream in filter(None, (sys.stdout, sys.stderr)):
@@ -345,6 +351,7 @@ class Channel:
         self.reading = reading
         self.writing = writing
         self._longest = longest
+        self._read = bytearray()  # of the next record: most records come whole, and with one call
         self._alone = threading.Lock()  # an FMU may log from another thread
 
     def send(self, kind: str, content: Any = None, dumps: Callable[[Any], bytes] = pickle.dumps) -> None:
@@ -364,23 +371,25 @@ class Channel:
         Raises:
             EOFError: the other side is gone.
         """
-        size = int.from_bytes(self._read(_HEAD, ready), "little")
-        if size > self._longest:
-            raise ValueError(f"a record of {size} bytes")
-        kind, content = pickle.loads(self._read(size, ready))
-        return kind, content
-
-    def _read(self, size: int, ready: Callable[[], None]) -> bytes:
-        read = bytearray()
-        while len(read) < size:
+        read = self._read
+        while len(read) < (end := self._end()):
             ready()
-            data = os.read(self.reading, min(size - len(read), _PART))
-            if len(data) == size:
-                return data
+            data = os.read(self.reading, _PART)
             if not data:
                 raise EOFError
             read += data
-        return bytes(read)
+        kind, content = pickle.loads(read[_HEAD:end])
+        del read[:end]
+        return kind, content
+
+    def _end(self) -> int:
+        """Return where the next record ends; where its head ends as long as that is not there."""
+        if len(self._read) < _HEAD:
+            return _HEAD
+        size = int.from_bytes(self._read[:_HEAD], "little")
+        if size > self._longest:
+            raise ValueError(f"a record of {size} bytes")
+        return _HEAD + size
 
     def close(self) -> None:
         for descriptor in (self.reading, self.writing):

@@ -141,8 +141,6 @@ except ImportError:  # Windows, where an open file cannot be replaced anyway
 
 NEW = ".new"
 """Suffix of the temporary file while a file is written."""
-
-
 LOCK_FILE = ".yawbench-lock"
 """Name of the file in a results folder that is locked by its writer."""
 

@@ -4,13 +4,13 @@
 a run: `scenario`, `recordings`, `wiring`, `master`, `results`. Beside them `plan` (the type), `signal_names`,
 `coupling_algorithms` (with their theory) and `fault_kinds` (what can go wrong with a signal).
 
-Not here: cars, statistics, figures, HTML (`yawbench`).
+The wiring is told of cars by a `Domain`.
+
+Not here: measurements, cars, statistics, figures, HTML (`yawbench`).
 """
 
 PLUGINS = {
     "kind of file": {
         "scenario": "yawbench.orchestrator.scenario.schema:ScenarioSpec",
-        "vehicle": "yawbench.orchestrator.scenario.schema:Vehicle",
-        "measurement": "yawbench.orchestrator.recordings.measurement:MeasurementSpec",
     }
 }

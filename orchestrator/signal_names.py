@@ -8,14 +8,13 @@ characters and every other character matches itself.
 from __future__ import annotations
 
 import re
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from functools import cache, lru_cache
+from functools import lru_cache
 from typing import Literal, NamedTuple
 
 from yawbench.foundation.messages import short
 from yawbench.vocabulary.facts import FACTS
-from yawbench.vocabulary.signals import SYMBOLS
 
 TIMES = ("start_time", "stop_time", "step_size")
 OF_RUN = (*TIMES, "algorithm")
@@ -82,23 +81,26 @@ class SignalName(NamedTuple):
         return f"{self.instance}.{self.variable}" if self.instance else self.variable
 
 
-def alike(output: str, name: str) -> int:
+def alike(output: str, name: str, symbols: Mapping[str, str]) -> int:
     """Return how many words the names of an output and of an input share: 0 if it should not be suggested.
 
     A reference value does not match an actual value.
+
+    Args:
+        output, name: the names.
+        symbols: symbol -> the words that it stands for.
     """
-    words = words_of(output), words_of(name)
+    words = words_of(output, symbols), words_of(name, symbols)
     return len(words[0] & words[1]) if ("ref" in words[0]) == ("ref" in words[1]) else 0
 
 
-@cache
-def words_of(name: str) -> frozenset[str]:
+def words_of(name: str, symbols: Mapping[str, str]) -> frozenset[str]:
     """Return the words of a signal's name, symbols translated: of `PsiDot` and `yaw_rate` yaw and rate.
 
     Words of up to two letters do not count.
     """
     words = [name, *re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])", name)]
-    translated = "_".join(SYMBOLS.get(word.lower(), word.lower()) for word in words)
+    translated = "_".join(symbols.get(word.lower(), word.lower()) for word in words)
     return frozenset(word for word in translated.split("_") if len(word) > 2)
 
 

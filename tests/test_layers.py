@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from yawbench.parts import PARTS
+from yawbench import parts
 
 ROOT = Path(__file__).parents[1]
 LAYERS = (
@@ -22,6 +22,7 @@ LAYERS = (
     "foundation",
     "fmus",
     "orchestrator",
+    "yawbench.measurements",
     "yawbench.vehicles",
     "yawbench.metrics",
     "yawbench.figures",
@@ -34,10 +35,10 @@ LAYERS = (
     "yawbench",
 )
 """Folders, and modules of the bench, each of which imports only itself and those before it."""
-WINGS = tuple(part for part in PARTS if part not in LAYERS and part.removeprefix("yawbench.") not in LAYERS)
+WINGS = (*parts.WINGS, *parts.IMPORTED)
 """Folders that no other module imports; each may import all layers."""
-OUTERMOST = ("yawbench.cli", "yawbench.gym", "yawbench.__main__")
-"""Modules that no other module imports but by running them, or that users import."""
+OUTERMOST = ("yawbench.cli", "yawbench.__main__")
+"""Modules that no other module imports but by running them."""
 
 
 def module_files() -> dict[str, Path]:
@@ -136,6 +137,18 @@ def test_what_runs_inside_fmus_needs_the_standard_library_alone(layer):
                 names += [node.module or ""] if isinstance(node, ast.ImportFrom) and not node.level else []
                 foreign |= {name.split(".")[0] for name in names}
     assert foreign - sys.stdlib_module_names <= {"yawbench", "pythonfmu"}
+
+
+def test_the_orchestrator_knows_no_car():
+    """A `Domain` tells of signals, quantities and files of cars; facts and roles are names of scenarios."""
+    known = {
+        imported
+        for module in FILES
+        if layer_of(module) == "orchestrator"
+        for _, imported in imports_of(module)
+        if layer_of(imported) == "vocabulary"
+    }
+    assert known == {"yawbench.vocabulary.facts", "yawbench.vocabulary.roles"}
 
 
 def test_a_run_imports_nothing_that_draws_judges_or_makes_many_runs(tmp_path):

@@ -11,11 +11,10 @@ from tests.checkout import ROOT, copy_checkout, run_in
 from tests.refusals import refused
 from yawbench.foundation import plugins
 from yawbench.foundation.errors import ScenarioError
-from yawbench.parts import PARTS
+from yawbench.parts import IMPORTED, PARTS
+from yawbench.parts import WINGS as REGISTERED
 
-WINGS = [
-    part for part in PARTS if part not in ("yawbench.commands", "yawbench.orchestrator", "yawbench.studies")
-]
+WINGS = [*REGISTERED, *IMPORTED]
 CORE = (
     "tests/orchestrator/test_scenario.py",
     "tests/orchestrator/test_wiring.py",
@@ -85,7 +84,10 @@ def test_without_one_wing_the_rest_works_and_the_tests_of_the_core_pass(wing, tm
 
 
 def test_what_is_listed_is_there():
-    assert all((ROOT / part.replace("yawbench.", "yawbench/") / "__init__.py").is_file() for part in PARTS)
+    assert all(
+        (ROOT / part.replace("yawbench.", "yawbench/") / "__init__.py").is_file()
+        for part in (*PARTS, *IMPORTED)
+    )
 
 
 def test_what_a_missing_part_makes_is_refused_in_a_sentence():

@@ -14,9 +14,9 @@ import numpy as np
 
 from yawbench.foundation.errors import Diagnostic, ResultsError, ScenarioError, warnings_in
 from yawbench.foundation.messages import hint, short
+from yawbench.measurements.measured_results import filtered_alike, measured_results
 from yawbench.metrics.expressions import STANDARD, MetricValue, evaluate, evaluate_all, metric, why_none
 from yawbench.orchestrator.plan import Override
-from yawbench.orchestrator.results.measurement_results import filtered_alike, measured_results
 from yawbench.orchestrator.results.reader import Results
 from yawbench.orchestrator.scenario.overrides import with_changes
 from yawbench.proving_ground.standard_tests import TESTS, Evaluation, TestName

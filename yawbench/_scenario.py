@@ -26,7 +26,7 @@ from yawbench.orchestrator.fault_kinds import FaultList, FaultName
 from yawbench.orchestrator.master.log import Log
 from yawbench.orchestrator.master.simulate import simulate_in_memory
 from yawbench.orchestrator.plan import Instance, Override, Plan
-from yawbench.orchestrator.scenario import loader
+from yawbench.orchestrator.scenario import catalogue
 from yawbench.orchestrator.scenario.overrides import faults_at, setting, with_changes
 from yawbench.orchestrator.scenario.schema import LoadedScenario
 from yawbench.orchestrator.signal_names import Target
@@ -55,7 +55,7 @@ def load(source: str | Path) -> Scenario:
     Raises:
         ScenarioError: the scenario does not exist or is invalid.
     """
-    scenario = Scenario(loader.find(arguments.path(source, "source"), "a scenario").absolute())
+    scenario = Scenario(catalogue.find(arguments.path(source, "source"), "a scenario").absolute())
     scenario._loaded  # noqa: B018 - raises now if it is invalid
     return scenario
 

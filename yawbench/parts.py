@@ -1,10 +1,13 @@
-"""The parts of yawbench that register themselves (see `foundation.plugins`): the core, and wings."""
+"""The parts of yawbench: those that register themselves (see `foundation.plugins`), and wings."""
 
-PARTS = (
+CORE = (
     "yawbench.commands",
+    "yawbench.measurements",
     "yawbench.orchestrator",
     "yawbench.studies",
-    # Wings: nothing outside them imports them. Without its line and its folder the rest works.
+    "yawbench.vehicles",
+)
+WINGS = (
     "yawbench.bench",
     "yawbench.cluster",
     "yawbench.interop",
@@ -12,3 +15,7 @@ PARTS = (
     "yawbench.measured_cars",
     "yawbench.ranking",
 )
+"""Nothing outside a wing imports it: without its line and its folder the rest works."""
+PARTS = (*CORE, *WINGS)
+IMPORTED = ("yawbench.gym",)
+"""Wings that add nothing to the program and need packages of their own: users import them."""

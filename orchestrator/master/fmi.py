@@ -230,8 +230,6 @@ def _log_fmi3(environment: int, status: int, category: bytes | None, text: bytes
 
 
 _logger_fmi3 = fmi3LogMessageCallback(_log_fmi3)
-
-
 INSTANCE_TYPES: dict[int, type[CtypesInstance]] = {2: Fmi2Instance, 3: Fmi3Instance}
 """Major version of FMI -> class of its instances."""
 

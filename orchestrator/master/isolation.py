@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
+import os
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -26,7 +27,7 @@ from yawbench.foundation import processes
 from yawbench.foundation.errors import SimulationError, YawbenchError
 from yawbench.foundation.interrupts import stop_requested_at
 from yawbench.foundation.messages import listed
-from yawbench.foundation.processes import ProcessLost, Worker, die_with_parent, flush_output
+from yawbench.foundation.processes import ProcessLost, Worker, die_with_parent, end_copy_of, flush_output
 
 from ..plan import Instance, Plan
 from .arithmetic import Arithmetic
@@ -262,6 +263,7 @@ class InstanceServer:
     """In the process of an instance: does with the FMU what the master asks for."""
 
     def __init__(self) -> None:
+        self._process = os.getpid()
         self._log = LogRelay(processes.asking, timed=False)
         self._arithmetic: Arithmetic | None = Arithmetic()  # until stepping begins
         self._instance: CtypesInstance
@@ -269,6 +271,7 @@ class InstanceServer:
     def call(self, request: str, arguments: Sequence[Any]) -> Any:
         """Call a method of this object or of the instance."""
         result = getattr(self if hasattr(self, request) else self._instance, request)(*arguments)
+        end_copy_of(self._process)
         if self._arithmetic is not None:
             self._arithmetic.restore("", self._log)
         return result

@@ -6,6 +6,7 @@ makes them.
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -17,6 +18,7 @@ import numpy as np
 from yawbench.fmus.fmu import Value
 from yawbench.foundation.errors import ResultsError, SimulationError
 from yawbench.foundation.interrupts import StopFlag
+from yawbench.foundation.processes import end_copy_of
 
 from ..plan import Instance, Plan
 from ..results.recorder import BLOCK
@@ -83,11 +85,13 @@ class RunLifecycle:
     def go(self, opener: OpenInstance) -> None:
         """Open the FMUs, initialize them and step to the end."""
         corrupted: set[Path] = set()
+        process = os.getpid()
         for number, instance in enumerate(self.plan.instances):
             for violation in instance.fmu.violations:
                 self.log.add(instance.name, WARNING, MASTER, violation.message, self.plan.time(0))
             self.position.enter(number, "initialization")
             self._fmu_instances[instance.name] = opener(instance, self.log, corrupted)
+            end_copy_of(process)
             self.position.leave()
         self._master = Master(self.plan, self._fmu_instances, self.log, self._stop, self.position)
         self.loop = self._master.loop

@@ -4,10 +4,12 @@
    the loop in `master.py` is the reference. Compiled without contraction to fused operations, so that every
    sum has the same bits in both. */
 
+#include <pthread.h>
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 #include <time.h>
+#include <unistd.h>
 
 enum kind { END, CALL, COPY, BLEND, CONVERT, SERIES, DISTURB, EXCHANGE_2, EXCHANGE_3, STEP_2, STEP_3 };
 
@@ -67,6 +69,19 @@ struct run {
     int64_t pause;                  /* time after which Python gets a turn [ns] */
     int64_t status;
 };
+
+/* Whether this process is a copy that an FMU has made by `fork` since the walk began. */
+static volatile bool copied;
+
+static void note_copy(void)
+{
+    copied = true;
+}
+
+__attribute__((constructor)) static void ask_for_copies(void)
+{
+    pthread_atfork(NULL, NULL, note_copy);
+}
 
 typedef int exchange_2(void *, const uint32_t *, size_t, double *);
 typedef int exchange_3(void *, const uint32_t *, size_t, double *, size_t);
@@ -172,11 +187,15 @@ static enum answer work(struct run *run)
         case EXCHANGE_3:
             run->position->call = op->call;
             run->status = exchange(op);
+            if (copied)
+                _exit(1);
             break;
         case STEP_2:
         case STEP_3:
             run->position->call = op->call;
             run->status = take_step(op);
+            if (copied)
+                _exit(1);
             if (op->answers && (op->answers->early || op->answers->ended))
                 return STATUS;
             break;
@@ -221,6 +240,7 @@ static void record(struct run *run)
 __attribute__((visibility("default"))) int walk(struct run *run)
 {
     const int64_t later = now() + run->pause;
+    copied = false;
     for (; run->k <= run->end; run->k++) {
         if (run->at == -1) {
             if (*run->stop)

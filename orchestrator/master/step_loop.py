@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import ctypes
 import math
+import os
 import time
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
@@ -25,6 +26,7 @@ from yawbench.fmus.fmu import Value
 from yawbench.foundation.errors import Interrupted, SimulationError
 from yawbench.foundation.interrupts import StopFlag
 from yawbench.foundation.messages import listed
+from yawbench.foundation.processes import end_copy_of
 
 from ..plan import Plan
 from .arithmetic import Arithmetic
@@ -135,6 +137,7 @@ class Master:
         self._expected = np.arange(signals.n_outputs)  # outputs checked to be finite
         self._ones = np.ones(signals.n_outputs)
         self._ending: EndRequested | None = None
+        self._process = os.getpid()
         self._points: Iterator[int] = iter(())  # communication points still to be reached
         self._arithmetic = Arithmetic()
         self._compiled: CompiledLoop | None = None
@@ -177,6 +180,7 @@ class Master:
             Interrupted: a stop was requested.
             EndRequested: an instance asked to end the run.
         """
+        end_copy_of(self._process)
         first, cycle = self.completed + 1, self.program.cycle
         self._operations = {
             k % cycle: self.program.at(k) for k in range(first, min(end, first + cycle - 1) + 1)
@@ -212,6 +216,7 @@ class Master:
                 if status:
                     self._answer(k, operation, status)
             position.call = -1
+            end_copy_of(self._process)
             if not finite(total(ones)):
                 self._check_finite(k)
             time.value = (s + k * p) / q
@@ -243,6 +248,7 @@ class Master:
                 else:
                     self._position.call = self._call_of.get((operation.instance, operation.kind), -1)
                     status = call()
+                    end_copy_of(self._process)
                 if status:
                     self._answer(k, operation, status)
                     end = end if self._ending is None else k
@@ -290,6 +296,7 @@ class Master:
 
     def _check_initialization(self, instance: str, what: str, status: Status) -> None:
         """Check a call made during initialization, where a logged error counts whatever the status is."""
+        end_copy_of(self._process)
         self._position.returned = time.monotonic()
         self._arithmetic.restore(instance, self.log)
         status = self.signals.of[instance].fmu_instance.note(status)

@@ -1,6 +1,6 @@
-"""Files of measured columns: formats, clocks, units, gaps; measurement files that assign them to signals.
+"""Files of recorded columns: formats, clocks, units, gaps.
 
-Text tables, Parquet, MDF and MATLAB files of loggers become segments of signals with increasing time.
+Text tables, Parquet, MDF and MATLAB files of loggers become columns with times and units.
 
-Not here: flaws, fits and validation of recordings (`yawbench.measured_cars`).
+Not here: which signals of a car they are (`yawbench.measurements`).
 """

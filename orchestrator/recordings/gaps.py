@@ -27,8 +27,6 @@ ROUNDING = 1e-9
 """Distance of times that count as the same [s]; chosen: a nanosecond, far below any step."""
 MOST = 20
 """Gaps of a segment that have a warning each."""
-
-
 Samples = tuple[np.ndarray, np.ndarray]
 """Times [s] and values of a signal; NaN: none was taken."""
 

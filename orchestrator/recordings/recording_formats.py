@@ -22,10 +22,9 @@ import numpy as np
 from yawbench.foundation.errors import ResultsError, ScenarioError
 from yawbench.foundation.messages import cut, hint, listed
 from yawbench.foundation.safe_files import read_bytes, reading, reason
-from yawbench.vocabulary.signals import SignalEntry
 
 from ..results.run_record import RUN_FILE, check_record
-from ..scenario.quantities import Unit, meant_unit, spellings
+from ..scenario.quantities import Unit, spellings
 from .text_tables import MISSING, Mark, read_text_table, split_header
 from .units_of_loggers import factors, stated_unit
 
@@ -323,10 +322,6 @@ def _numbers(column: np.ndarray, what: str) -> np.ndarray:
     return numbers
 
 
-SHARE_OF_SPIKES = 0.01
-"""Share of samples that may exceed the largest plausible value; chosen: accelerometers have spikes."""
-
-
 def unit_of(name: str, column: str, stated: str | None, wanted: str) -> str:
     """Return the unit of a signal's column or of the time column.
 
@@ -340,28 +335,3 @@ def unit_of(name: str, column: str, stated: str | None, wanted: str) -> str:
             f"'{name}: {{column: {column}, unit: {wanted}}}', or in the file's header '{column} [{wanted}]'"
         )
     return unit
-
-
-def refuse_implausible(
-    name: str, entry: SignalEntry, column: str, recorded: np.ndarray, values: np.ndarray, unit: str
-) -> None:
-    """Raise ValueError if values of a signal are implausible for a car; suggest the unit that was meant.
-
-    Args:
-        name, entry: the signal.
-        column: heading of its column.
-        given: the numbers of the column, in `unit`.
-        values: the same in SI.
-        unit: unit of the column.
-    """
-    largest, wanted = entry.largest, entry.unit
-    values = values[~np.isnan(values)]
-    if largest is None or np.mean(np.abs(values) > largest) <= SHARE_OF_SPIKES:
-        return
-    number = float(np.nanquantile(np.abs(recorded.astype(float)), 1.0 - SHARE_OF_SPIKES))
-    likely = meant_unit(number, unit, wanted, lambda value: abs(value) <= largest)
-    value = f"{number:.4g} {unit}" if unit != "1" else f"{number:.4g}"
-    raise ValueError(
-        f"column {column!r}: no car reaches {name} of {value}, "
-        f"at most {largest:.4g} {wanted} is allowed{f'; did you mean {likely!r}?' if likely else ''}"
-    )

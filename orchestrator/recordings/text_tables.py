@@ -166,8 +166,6 @@ def encoding_of(raw: bytes) -> str:
 
 _UNDEFINED = frozenset(b"\x81\x8d\x8f\x90\x9d")
 """Bytes that Windows-1252 does not define; Latin-1 does."""
-
-
 _Row = tuple[list[str], str]
 """Cells of a line, and their kinds, see `_kind`."""
 

@@ -170,8 +170,6 @@ def values_of(column: pa.Array) -> np.ndarray:
 
 BLOCK = 8_000_000
 """Bytes read at a time; chosen: a few thousand rows of a hundred variables."""
-
-
 LONGEST = 25
 """Characters that a number takes at most, with a comma: -1.7976931348623157e+308."""
 _POWERS = range(-292, 325)

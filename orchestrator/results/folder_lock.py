@@ -29,8 +29,6 @@ from yawbench.foundation.safe_files import (
 
 LOOKS = 100
 """Attempts to get a lock, 10 ms apart. Chosen: runs whose command was killed end within that time."""
-
-
 _own: set[Path] = set()
 """Folders that this process has locked."""
 

@@ -44,7 +44,6 @@ from yawbench.fmus.fmu import Value
 from yawbench.foundation.errors import Diagnostic
 from yawbench.foundation.messages import listed, short
 from yawbench.vocabulary.facts import FACTS
-from yawbench.vocabulary.vehicle import CAR
 
 from ..coupling_algorithms import ALGORITHMS
 from ..plan import Given, Override, ValueOrigin, ValueSource
@@ -59,8 +58,6 @@ if TYPE_CHECKING:
 
 AXLES = ("front", "rear")
 PARAMETERS = "parameters"
-
-
 AlgorithmName = Annotated[str, OneOf(ALGORITHMS)]
 
 
@@ -309,13 +306,6 @@ Speed = Annotated[Given[Scalar], _AsGiven(), WithJsonSchema(in_unit("m/s"))]
 GivenScalar = Annotated[Given[Scalar], _AsGiven()]
 
 
-def _of_car() -> dict[str, Any]:
-    """Return the JSON Schema of a car's parameters: its quantities, and others that FMUs declare."""
-    known = {name: {**in_unit(quantity.unit), "description": quantity.text} for name, quantity in CAR.items()}
-    others = {"type": ["number", "string", "boolean"]}
-    return {"type": "object", "properties": known, "additionalProperties": others}
-
-
 class Vehicle(StrictModel):
     """A vehicle file: parameters for every instance that declares them."""
 
@@ -324,9 +314,7 @@ class Vehicle(StrictModel):
     tyres: Tyres | None = Field(
         None, description="Tyre property file (.tir), or front: and rear: of one each, relative to this file"
     )
-    parameters: Annotated[dict[str, GivenScalar], WithJsonSchema(_of_car())] = Field(
-        {}, description="Parameter name -> value"
-    )
+    parameters: dict[str, GivenScalar] = Field({}, description="Parameter name -> value")
 
     def placed(self, document: Document) -> Self:
         """Return the vehicle with the origins and places of its values."""

@@ -29,10 +29,15 @@ from .order import in_order
 
 
 class Connector:
-    """Finds the source of every input."""
+    """Finds the source of every input.
 
-    def __init__(self, system: WiringContext) -> None:
-        self._system = system
+    Args:
+        system: the system that is connected.
+        symbols: see `Domain`.
+    """
+
+    def __init__(self, system: WiringContext, symbols: Mapping[str, str]) -> None:
+        self._system, self._symbols = system, symbols
         self._scenario = system.scenario
         self._fmus = system.fmus
         self._outputs, self._inputs = system.outputs, system.inputs
@@ -283,7 +288,7 @@ class Connector:
     def _undriven(self, instance: str, variable: Variable) -> str:
         """Return the message for an input without a source."""
         shared = {
-            f"{source}.{name}": alike(name, variable.name)
+            f"{source}.{name}": alike(name, variable.name, self._symbols)
             for source, names in self._fitting_outputs(variable).items()
             if source != instance
             for name in names

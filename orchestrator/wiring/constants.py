@@ -14,12 +14,14 @@ from yawbench.foundation.errors import InvalidValueError, ScenarioError, code_of
 from yawbench.foundation.messages import fold, hint, resolved, span
 
 from ..plan import Given, InputSeries
+from ..scenario.catalogue import YAML
 from ..scenario.loader import LoadedScenario
 from ..scenario.quantities import unit_of
 from ..scenario.schema import SeriesSpec
 from ..scenario.yaml_lines import KeyPath
 from ..signal_names import SignalName
 from .context import WiringContext, facts_of
+from .domain import Domain, Measured
 from .parameters import value_for
 
 if TYPE_CHECKING:
@@ -28,8 +30,6 @@ if TYPE_CHECKING:
     from ..recordings.recording_formats import FileColumn
 
 Input = tuple[str, str]  # instance, variable
-
-
 FACT, INPUTS, CHANGED_FACT, CHANGED_INPUTS = range(4)
 """Levels of precedence, ascending: an overridden fact beats the file, but not other overrides."""
 
@@ -56,12 +56,12 @@ class Constant:
         return self.precedence in (FACT, CHANGED_FACT)
 
 
-def constants(system: WiringContext) -> dict[Input, Constant]:
+def constants(system: WiringContext, domain: Domain) -> dict[Input, Constant]:
     """Return the constant of each input, from the scenario's `inputs` and facts."""
     scenario, fmus, inputs = system.scenario, system.fmus, system.inputs
     read = None
     if any(isinstance(given.value, SeriesSpec) for given in scenario.inputs.values()):
-        read = _series_reader(system)
+        read = _series_reader(system, domain.measured)
     by_input = dict(_of_facts(system))
     fact_changed = any(constant.precedence == CHANGED_FACT for constant in by_input.values())
     for pattern, given in scenario.inputs.items():
@@ -147,14 +147,12 @@ def _of_facts(system: WiringContext) -> Iterator[tuple[Input, Constant]]:
 
 Reader = Callable[[SeriesSpec, str, Variable], InputSeries]
 """Callback: (specification, part matched by the `*` of its key, input) -> time series."""
-
-
 RECORDED = 100
 """Rows from which a file that no measurement file describes counts as recorded. Chosen: fewer are written by
 hand, with times as far apart as a ramp is long."""
 
 
-def _series_reader(system: WiringContext) -> Reader:
+def _series_reader(system: WiringContext, measured: Callable[[Path], Measured]) -> Reader:
     """Return a reader for the time series of a scenario, which reads every file once, and notes gaps in them.
 
     The reader raises ValueError if the file or a column is missing or unusable, the unit is incompatible, or
@@ -164,22 +162,21 @@ def _series_reader(system: WiringContext) -> Reader:
     # NumPy takes long to import
     from ..recordings.clocks import seconds_of
     from ..recordings.gaps import Gap, gaps_in
-    from ..recordings.measurement import ENDINGS, Measurement, load_measurement
     from ..recordings.recording_formats import ColumnFile, reading_series
 
     asked: dict[str, list[str]] = {}
 
     @cache
-    def opened(file: str) -> ColumnFile | Measurement:
+    def opened(file: str) -> ColumnFile | Measured:
         path = Path(os.path.normpath(scenario.path.parent / file))
-        if path.suffix in ENDINGS:
-            return load_measurement(path)
+        if path.suffix in YAML:
+            return measured(path)
         with reading_series(path):
             return ColumnFile(path, asked[file])
 
     def column_of(spec: SeriesSpec, name: str) -> FileColumn:
         file = opened(spec.file)
-        if isinstance(file, Measurement):
+        if not isinstance(file, ColumnFile):
             return file.column(name, spec.segment)
         if spec.segment is not None:
             raise ValueError(f"{spec.file} has no segments: only measurement files have")
@@ -189,10 +186,9 @@ def _series_reader(system: WiringContext) -> Reader:
         """Return the gaps of a column during the run; tables written by hand or of held values have none."""
         file = opened(spec.file)
         found: tuple[Gap, ...] = ()
-        if isinstance(file, Measurement):
-            segment = file.segment(spec.segment)
-            shift = float(times[0] - segment.time[0])
-            found = tuple(gap.later(shift) for gap in segment.gaps.get(name, ()))
+        if not isinstance(file, ColumnFile):
+            later = 0.0 if spec.begin is None else float(scenario.start_time - spec.begin)
+            found = tuple(gap.later(later) for gap in file.gaps(name, spec.segment))
         elif not held and len(times) >= RECORDED:
             found = gaps_in(times)
         start, stop = float(scenario.start_time), float(scenario.stop_time)

@@ -14,12 +14,14 @@ from yawbench.fmus.fmu import Fmu, Value, Variable
 from yawbench.foundation.errors import Diagnostic, Location, Severity, WiringError
 from yawbench.foundation.messages import fold_sentences
 from yawbench.vocabulary.facts import FACTS, Fact
-from yawbench.vocabulary.wheels import WHEELS
 
 from ..plan import Given, Instance, Plan
 from ..scenario.loader import LoadedScenario
 from ..scenario.yaml_lines import MOST_ERRORS, KeyPath
 from ..signal_names import OF_RUN, SignalName, Target, match, matching
+
+MOST_REPORTED = 4 * MOST_ERRORS
+"""Errors after which wiring ends. Chosen: those of inputs that differ by a wheel are told as one."""
 
 
 def facts_of(scenario: LoadedScenario) -> Iterator[tuple[str, Fact, Given[Value]]]:
@@ -114,7 +116,7 @@ class WiringContext:
         """
         where = where if isinstance(where, Location) else self.scenario.document.location(where)
         self.reported.append(((where, code), sentence))
-        if len(self.reported) >= len(WHEELS) * MOST_ERRORS:
+        if len(self.reported) >= MOST_REPORTED:
             raise WiringError(self.errors())
 
     def errors(self) -> list[Diagnostic]:

@@ -48,9 +48,9 @@ from .connections import Connector
 from .constants import Constant, Input, constants
 from .context import WiringContext
 from .control_side import exact
+from .domain import Domain
 from .faults import faults_of
 from .order import EvaluationOrder, evaluate
-from .parameters import Domain
 
 
 def missing_functions(
@@ -152,6 +152,7 @@ class Network:
 def _network(
     system: WiringContext,
     by_input: Mapping[Input, Constant],
+    symbols: Mapping[str, str],
     isolated: bool,
     networks: dict[Hashable, Network],
 ) -> Network:
@@ -166,7 +167,7 @@ def _network(
     key = tuple(map(id, follows)), instances, constant, swapped, scenario.explicit, isolated
     if key not in networks:
         errors, notes = len(system.reported), len(system.notes)
-        wires, kept = Connector(system).connect(by_input)
+        wires, kept = Connector(system, symbols).connect(by_input)
         record = recorded(system)
         evaluation = evaluate(system.fmus, wires)
         in_order = _sorted(wires, evaluation.order, system.fmus)
@@ -229,8 +230,8 @@ def make_plan(
     notes += [*scenario.document.notes, *stale_fmus(opened.values()), *host_needs(opened.values())]
     distributed = domain.parameters(system)
     parameters = distributed.of_instances()
-    by_input = constants(system)
-    network = _network(system, by_input, isolated, {} if networks is None else networks)
+    by_input = constants(system, domain)
+    network = _network(system, by_input, domain.symbols, isolated, {} if networks is None else networks)
     wires, record, evaluation = network.wires, network.record, network.evaluation
     values = _values(system, by_input, network)
     faults = faults_of(system, wires, record)

@@ -1,32 +1,27 @@
 """Distributes parameters to instances, and checks values by type, unit, limits and choices of the FMU.
 
-A vehicle file has values for all instances; quantities of a car (`vocabulary.vehicle`) that no instance takes
-are ignored.
+A vehicle file has values for all instances; those that are known otherwise (`Parameters.known`) may have no
+instance that takes them.
 """
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from yawbench.fmus.fmu import Fmu, Value, Variable, integer_limits
 from yawbench.foundation.errors import Diagnostic, code_of
 from yawbench.foundation.messages import closest, fold, hint, listed, short
 from yawbench.foundation.safe_files import TEXT, read_bytes
-from yawbench.vocabulary.friction_table import table_of
-from yawbench.vocabulary.patches import patches_of
-from yawbench.vocabulary.vehicle import CAR
 
 from ..plan import LITERATURE, Given, Instance, ValueOrigin, ValueSource
 from ..scenario import quantities
-from ..scenario.schema import LoadedScenario, TextSpec
+from ..scenario.schema import TextSpec
 from .context import WiringContext, facts_of
 
-WRITTEN: dict[str, Callable[[str], object]] = {"patches": patches_of, "friction_table": table_of}
-"""Text parameters with a format -> their parser, so that errors are reported before the run."""
 LARGEST, LARGEST_SINGLE = sys.float_info.max, (2 - 2**-23) * 2.0**127
 """Largest numbers of double and single precision."""
 
@@ -89,16 +84,21 @@ def _other(variable: Variable, raw: Value) -> Value:
         raise ValueError(f"must be true or false (got {short(raw)})")
     if variable.type == "String" and not isinstance(raw, str):
         raise ValueError(f"must be text (got {short(raw)}): put it in quotes")
-    if isinstance(raw, str) and variable.name in WRITTEN:
-        WRITTEN[variable.name](raw)
     return raw
 
 
 class Parameters:
     """The parameters of all instances: their own, else facts, else the vehicle file's values.
 
-    Who knows what a scenario is about derives further ones in a subclass (`Domain`).
+    Who knows what a scenario is about derives further ones in a subclass (see `Domain`).
+
+    Attributes:
+        known: quantities that mean something even if no instance takes them.
+        written: text parameter with a format -> its parser, so that errors are reported before the run.
     """
+
+    known: ClassVar[Collection[str]] = ()
+    written: ClassVar[Mapping[str, Callable[[str], object]]] = {}
 
     def __init__(self, system: WiringContext) -> None:
         self.system = system
@@ -124,7 +124,7 @@ class Parameters:
             takers = self.takers(name)
             for instance in takers:
                 self.give(instance, name, given)
-            if takers or name in CAR:
+            if takers or name in self.known:
                 continue
             if any(is_parameter(fmu, name) for fmu in self.system.before()):
                 self.system.note(
@@ -132,8 +132,8 @@ class Parameters:
                     f"vehicle.{name} is left out: no instance has such a parameter after the swap",
                 )
             else:
-                known = {v.name for fmu in self.fmus.values() for v in fmu.of("parameter")}
-                likely = closest(name, sorted(known | CAR.keys()))
+                declared = {v.name for fmu in self.fmus.values() for v in fmu.of("parameter")}
+                likely = closest(name, sorted(declared | {*self.known}))
                 guess = f"; did you mean {likely!r}?" if likely else ""
                 self.system.report(
                     given.where, f"no instance has a parameter {name!r}{guess}", "parameter-unknown"
@@ -153,7 +153,10 @@ class Parameters:
     def give(self, instance: str, name: str, given: Given[Any], says: str = "") -> None:
         """Set a parameter of an instance; report errors at the place of the value, with the prefix `says`."""
         try:
-            self.values[instance][name] = value_for(self.fmus[instance].variables[name], given.value)
+            value = value_for(self.fmus[instance].variables[name], given.value)
+            if isinstance(value, str) and name in self.written:
+                self.written[name](value)
+            self.values[instance][name] = value
         except ValueError as error:
             self.system.report(given.where, f"{says}{error}", code_of(error))
         self.system.given[instance][name] = given
@@ -252,13 +255,3 @@ def _unknown(instance: str, fmu: Fmu, name: str) -> str:
         return f"{instance}.{name} {fmu.refused[name]}"
     names = fold([v.name for v in fmu.of("parameter")])
     return f"{instance} ({fmu.name}) has no parameter {name!r}" + hint(name, names, lead="it has")
-
-
-@dataclass(frozen=True)
-class Domain:
-    """What is known of the things that scenarios are about, such as cars; by default nothing."""
-
-    parameters: Callable[[WiringContext], Parameters] = Parameters
-    """Distributes parameters, and derives those that follow from others."""
-    warnings: Callable[[LoadedScenario, Mapping[str, Instance]], list[Diagnostic]] = lambda *_: []
-    """Returns warnings about the values of a scenario's instances."""

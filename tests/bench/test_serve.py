@@ -27,8 +27,8 @@ from tests.reports.made_up import data_in, whole_car
 from tests.reports.test_viewer import labelled
 from yawbench.bench.server import ResultsServer
 from yawbench.bench.sliders import Bench, Superseded, Wanted, knobs_of, shown_first
-from yawbench.orchestrator.scenario import loader
-from yawbench.orchestrator.scenario.loader import find
+from yawbench.orchestrator.scenario import catalogue
+from yawbench.orchestrator.scenario.catalogue import find
 from yawbench.orchestrator.scenario.overrides import read_changes
 from yawbench.orchestrator.scenario.quantities import convert
 from yawbench.planner import Planner
@@ -356,9 +356,9 @@ def test_sliders_have_units_and_the_vocabularys_ranges(server):
     assert "<option selected>controller_fnn</option>" in options and "controller_off" in options
 
 
-@pytest.mark.parametrize("name", loader.names("a scenario"))
+@pytest.mark.parametrize("name", catalogue.names("a scenario"))
 def test_every_slider_of_a_shipped_scenario_begins_where_its_run_does(planner, name):
-    loaded, plan = planned(Job(name, loader.named(name), Path()), planner)
+    loaded, plan = planned(Job(name, catalogue.named(name), Path()), planner)
     knobs = {knob.target: knob for knob in knobs_of(loaded, plan)}
     for fact, unit in (("friction", "1"), ("speed", "m/s")):
         if fact in knobs:
@@ -366,7 +366,7 @@ def test_every_slider_of_a_shipped_scenario_begins_where_its_run_does(planner, n
             assert knobs[fact].value == float(convert(stated, unit) if isinstance(stated, str) else stated)
     shown = shown_first([*knobs.values()], plan)
     settings = [f"{target}={knobs[target].value!r}" for target in shown if target != "friction"]
-    again = planned(Job(name, loader.named(name), Path(), read_changes((), settings, ())), planner)[1]
+    again = planned(Job(name, catalogue.named(name), Path(), read_changes((), settings, ())), planner)[1]
     for one, other in zip(plan.instances, again.instances, strict=True):
         names = [variable.name for variable in one.fmu.of("parameter")]
         assert {n: one.parameter(n) for n in names} == {n: other.parameter(n) for n in names}

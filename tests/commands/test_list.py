@@ -11,7 +11,7 @@ from tests.refusals import each_mentions, mentions
 from yawbench.metrics.expressions import columns_for, evaluate_all
 from yawbench.orchestrator.results.reader import found_runs, load_results
 from yawbench.orchestrator.results.run_record import FmuRecord, RunRecord, RunStatus
-from yawbench.orchestrator.scenario.loader import title_of
+from yawbench.orchestrator.scenario.catalogue import title_of
 from yawbench.reports.record_differences import differences
 from yawbench.studies.listings import runs_table
 from yawbench.vocabulary.motion import LEAST_SPEED

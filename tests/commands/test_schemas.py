@@ -18,10 +18,10 @@ import pytest
 from yawbench.cli import main
 from yawbench.commands.new import begin
 from yawbench.commands.schema import kinds, model_of, schema_of, schema_text
-from yawbench.measured_cars import fit
-from yawbench.orchestrator.recordings import measurement
+from yawbench.measured_cars import fit_file as fit
+from yawbench.measurements import measurement
 from yawbench.orchestrator.scenario import yaml_lines
-from yawbench.orchestrator.scenario.loader import kind_of
+from yawbench.orchestrator.scenario.catalogue import kind_of
 from yawbench.orchestrator.scenario.schema_validation import validate
 from yawbench.orchestrator.scenario.yaml_lines import Document
 from yawbench.ranking import ranking, threats

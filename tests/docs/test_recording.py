@@ -12,7 +12,7 @@ import pytest
 import yawbench as yb
 from tests.checkout import ROOT
 from tests.refusals import mentions
-from yawbench.measured_cars.fit import load_fit
+from yawbench.measured_cars.fit_file import load_fit
 from yawbench.measured_cars.validation import load_bands
 
 PLACE = ROOT / "notebooks" / "ferrari_250_lm"

@@ -21,7 +21,7 @@ from yawbench.cli import main
 from yawbench.foundation.errors import ResultsError, YawbenchError
 from yawbench.interop.ssp_write import for_omsimulator, write_ssp
 from yawbench.orchestrator.master.simulate import simulate
-from yawbench.orchestrator.scenario.loader import files
+from yawbench.orchestrator.scenario.catalogue import files
 from yawbench.orchestrator.scenario.ssp_archive import DESCRIPTION_FILE, SSC, SSD, SSM, SSV
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"

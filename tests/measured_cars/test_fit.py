@@ -13,7 +13,7 @@ from tests.commands.test_output import ALWAYS, documented
 from tests.reports.made_up import unpacked
 from yawbench.cli import main
 from yawbench.foundation.errors import ScenarioError
-from yawbench.measured_cars.fit import load_fit
+from yawbench.measured_cars.fit_file import load_fit
 from yawbench.orchestrator.scenario import yaml_lines
 
 TRUTH = {"yaw_inertia": 1791.6, "front": 0.72, "rear": 1.0}
@@ -112,7 +112,7 @@ def test_a_car_is_found_again_and_the_single_track_stands_beside(folder, capsys)
 
 
 def test_an_interrupted_fit_goes_on(folder, monkeypatch):
-    from yawbench.measured_cars import fit as module
+    from yawbench.measured_cars import scenario_model as module
 
     made = []
     original = module.execute

@@ -14,7 +14,7 @@ from tests.reports.browser import DESK, PHONE, Browser
 from tests.reports.flaws import check_whole, looks
 from tests.reports.made_up import data_in, unpacked
 from yawbench.figures.display import shown
-from yawbench.measured_cars.fit import load_fit
+from yawbench.measured_cars.fit_file import load_fit
 
 VIEWER = "const viewer = document.querySelector('.yv').viewer;"
 __all__ = ["folder"]

@@ -15,7 +15,7 @@ from tests.command_line import status_of
 from tests.refusals import mentions
 from yawbench.measured_cars.flaws import FlawKind, flaws_of
 from yawbench.measured_cars.single_track import effects_in
-from yawbench.orchestrator.recordings.measurement import load_measurement
+from yawbench.measurements.measurement import load_measurement
 
 T = np.arange(0.0, 30.0, 0.01)
 Drive = Callable[[int], tuple[np.ndarray, np.ndarray]]

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from yawbench.foundation.errors import ScenarioError
-from yawbench.orchestrator.recordings.measurement import Measurement, load_measurement
-from yawbench.orchestrator.recordings.segment import Segment
+from yawbench.measurements.measurement import Measurement, load_measurement
+from yawbench.measurements.segment import Segment
 
 TIMES = np.round(0.1 * np.arange(700), 1)
 """s: 70 s at 10 Hz, past the end of a minute."""

@@ -13,7 +13,7 @@ import pytest
 import yawbench as yb
 from tests.refusals import mentions, refused
 from yawbench.foundation.errors import ScenarioError
-from yawbench.orchestrator.scenario import loader
+from yawbench.orchestrator.scenario import catalogue
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 NAME = "fuzzy_feedback/single_sine"
@@ -48,10 +48,10 @@ def test_the_nearest_folder_of_scenarios_comes_before_the_one_that_comes_along(t
     below = tmp_path / "deep" / "er"
     below.mkdir(parents=True)
     monkeypatch.chdir(below)
-    assert loader.find(NAME, "a scenario") == own.with_suffix(".yaml")
-    assert loader.names("a scenario").count(NAME) == 1
+    assert catalogue.find(NAME, "a scenario") == own.with_suffix(".yaml")
+    assert catalogue.names("a scenario").count(NAME) == 1
     monkeypatch.chdir(tmp_path)
-    assert loader.find(NAME, "a scenario") == Path("scenarios", f"{NAME}.yaml")
+    assert catalogue.find(NAME, "a scenario") == Path("scenarios", f"{NAME}.yaml")
 
 
 def test_the_library_knows_the_names_that_the_commands_know(tmp_path, monkeypatch):
@@ -88,17 +88,17 @@ def test_a_folder_in_place_of_a_file_names_the_files_in_it(yawbench, command, fo
 
 
 def test_a_vehicle_file_goes_by_its_name_with_or_without_its_folder():
-    van = loader.find("van", "a vehicle file")
-    assert van == loader.find("vehicles/van", "a vehicle file")
+    van = catalogue.find("van", "a vehicle file")
+    assert van == catalogue.find("vehicles/van", "a vehicle file")
     assert van.samefile(SCENARIOS / "vehicles" / "van.yaml")
     with refused(ScenarioError, "scenario-unknown", names=("'large_salon'", "'large_saloon'")):
-        loader.find("large_salon", "a vehicle file")
+        catalogue.find("large_salon", "a vehicle file")
     with refused(ScenarioError, "scenario-unknown", names=("'25mps'", "fnn_sideslip/25mps")):
-        loader.find("25mps", "a scenario")
+        catalogue.find("25mps", "a scenario")
 
 
 def test_the_glance_at_a_file_sees_the_kind_that_its_schema_sees():
-    kinds = {path.name: kind for path, kind in loader.files(SCENARIOS / "fnn_sideslip", list(KINDS))}
+    kinds = {path.name: kind for path, kind in catalogue.files(SCENARIOS / "fnn_sideslip", list(KINDS))}
     assert kinds == {
         **dict.fromkeys(("15mps.yaml", "25mps.yaml", "40mps.yaml"), "a scenario"),
         **dict.fromkeys((f"{speed}mps_actuators.yaml" for speed in (15, 25, 40)), "a scenario"),

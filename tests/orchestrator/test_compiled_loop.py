@@ -30,7 +30,7 @@ from yawbench.orchestrator.master import compiled_loop
 from yawbench.orchestrator.master.simulate import simulate
 from yawbench.orchestrator.master.step_loop import RunPosition
 from yawbench.orchestrator.results.reader import load_results
-from yawbench.orchestrator.scenario.loader import names
+from yawbench.orchestrator.scenario.catalogue import names
 
 pytestmark = [
     pytest.mark.skipif(sys.platform != "linux", reason="compiles for Linux"),

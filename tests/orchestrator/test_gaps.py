@@ -13,12 +13,12 @@ from tests.command_line import status_of
 from yawbench.figures.display import LabelledRun
 from yawbench.figures.plots import spans_of
 from yawbench.foundation.errors import ScenarioError
-from yawbench.measured_cars.fit import load_fit
+from yawbench.measured_cars.fit_file import load_fit
 from yawbench.measured_cars.flaws import FlawKind, flaws_of
 from yawbench.measured_cars.single_track import effects_in
+from yawbench.measurements.measured_results import load_run
+from yawbench.measurements.measurement import load_measurement
 from yawbench.orchestrator.recordings.gaps import gaps_in
-from yawbench.orchestrator.recordings.measurement import load_measurement
-from yawbench.orchestrator.results.measurement_results import load_run
 from yawbench.orchestrator.scenario.loader import load_scenario
 from yawbench.planner import Planner
 from yawbench.proving_ground.steering_tests import evaluate_step

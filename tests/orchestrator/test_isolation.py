@@ -46,7 +46,8 @@ def foreign(tmp_path):
             if file.name == "idea.c":
                 assert STEP in text
                 text = text.replace(STEP, f"if (t > 0.0495) {{ {act} }}\n    {STEP}")
-                text = f"#include <signal.h>\n#include <stdlib.h>\n#include <unistd.h>\n{text}"
+                headers = ("signal", "stdio", "stdlib", "unistd")
+                text = "".join(f"#include <{name}.h>\n" for name in headers) + text
             file.write_text(text)
         return build_here(tmp_path / "components" / "controllers" / "idea", tmp_path / "built")
 
@@ -119,6 +120,18 @@ def test_units_end_when_the_master_is_killed(fmus, tmp_path):
     command = [sys.executable, "-c", code]
     done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=ROOT, timeout=60)
     assert len(done.stdout.split()) == len(UNITS), done.stderr
+
+
+@needs_cc
+@pytest.mark.parametrize("isolate", [True, False])
+def test_the_copies_of_a_unit_that_forks_in_every_step_end_at_once(foreign, run, tmp_path, isolate):
+    went_on = tmp_path / "went_on"
+    tell = f'FILE *f = fopen("{went_on}", "a"); fprintf(f, "%d\\n", (int)getpid()); fclose(f);'
+    act = f"static int n; if (n++ < 6) {{ {tell} fork(); }}"
+    status, _, results = run(foreign(act), isolate=isolate)
+    assert status == 0
+    assert results.time[-1] == pytest.approx(0.1)
+    assert len(set(went_on.read_text().split())) == 1
 
 
 @needs_cc

@@ -18,8 +18,8 @@ from tests.orchestrator.measured_files import (
     segment,
 )
 from yawbench.foundation.errors import ScenarioError
-from yawbench.orchestrator.recordings.measurement import load_measurement
-from yawbench.orchestrator.recordings.segment import Segment
+from yawbench.measurements.measurement import load_measurement
+from yawbench.measurements.segment import Segment
 
 AIM = (
     '"Format","AiM CSV File"\r\n"Session","Airfield"\r\n"Vehicle","Car 7"\r\n"Racer","Nobody"\r\n'

@@ -15,10 +15,10 @@ from tests.reports.made_up import unpacked
 from yawbench.cli import main
 from yawbench.foundation.errors import ResultsError, ScenarioError
 from yawbench.measured_cars.single_track import start_states
+from yawbench.measurements.measured_results import load_run
+from yawbench.measurements.measurement import load_measurement
+from yawbench.measurements.segment import LowPass, Segment, to_centre_of_mass
 from yawbench.orchestrator.plan import InputSeries
-from yawbench.orchestrator.recordings.measurement import load_measurement
-from yawbench.orchestrator.recordings.segment import LowPass, Segment, to_centre_of_mass
-from yawbench.orchestrator.results.measurement_results import load_run
 from yawbench.orchestrator.scenario.loader import load_scenario
 from yawbench.planner import Planner
 

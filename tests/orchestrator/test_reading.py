@@ -24,9 +24,9 @@ from tests.orchestrator.measured_files import (
     segment,
 )
 from yawbench.foundation.errors import InvalidValueError, ScenarioError
+from yawbench.measurements.measurement import load_measurement
+from yawbench.measurements.segment import even_grid
 from yawbench.orchestrator.recordings.clocks import seconds_of
-from yawbench.orchestrator.recordings.measurement import load_measurement
-from yawbench.orchestrator.recordings.segment import even_grid
 from yawbench.orchestrator.recordings.units_of_loggers import unit_in_file
 from yawbench.orchestrator.scenario.quantities import parse_unit
 

@@ -13,8 +13,8 @@ import pytest
 from tests.command_line import status_of
 from tests.refusals import mentions
 from yawbench.components.drivers.sine_with_dwell import SineWithDwellParameters, sine_with_dwell
+from yawbench.measurements.measured_results import load_run
 from yawbench.metrics.verdict import NotJudged, Status, Verdict, apart, not_judged
-from yawbench.orchestrator.results.measurement_results import load_run
 from yawbench.proving_ground.sine_with_dwell import amplitudes, evaluate_dwell, is_series, judge_series
 from yawbench.proving_ground.standard_tests import Evaluation
 from yawbench.proving_ground.steering_tests import G, characteristic_angle, evaluate_slow_steer

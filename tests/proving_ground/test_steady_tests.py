@@ -17,7 +17,7 @@ from yawbench.components.drivers.sine_sweep import SineSweepParameters, sweep
 from yawbench.metrics.verdict import Status, Verdict
 from yawbench.orchestrator.results.reader import Results
 from yawbench.orchestrator.results.run_record import RunRecord
-from yawbench.orchestrator.scenario.loader import SHIPPED
+from yawbench.orchestrator.scenario.catalogue import SHIPPED
 from yawbench.proving_ground.braking_and_wind import evaluate_turn
 from yawbench.proving_ground.standard_tests import Evaluation
 from yawbench.proving_ground.steering_tests import (

@@ -13,7 +13,7 @@ from tests.command_line import status_of
 from tests.refusals import mentions
 from tests.reports.made_up import unpacked
 from yawbench.foundation.errors import ScenarioError
-from yawbench.orchestrator.scenario.loader import SHIPPED
+from yawbench.orchestrator.scenario.catalogue import SHIPPED
 from yawbench.ranking.disciplines import discipline_table, disciplines, overview
 from yawbench.ranking.gains_and_laws import compared_gains, gains_and_laws, ratio_of_spreads
 from yawbench.ranking.threat_runs import RESOLUTION, Attempt, Survived, ThreatResult, _search

@@ -21,7 +21,7 @@ from yawbench.components.driving.track import LaneChangeParameters, Track
 from yawbench.figures.display import digits_of, shown_unit
 from yawbench.figures.panels import LabelledRun
 from yawbench.foundation.errors import ResultsError
-from yawbench.orchestrator.results.measurement_results import MeasuredResults
+from yawbench.measurements.measured_results import MeasuredResults
 from yawbench.orchestrator.results.reader import Results
 from yawbench.orchestrator.results.run_record import RunRecord
 from yawbench.reports.page_parts import without_comments

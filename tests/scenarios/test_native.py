@@ -8,7 +8,7 @@ import yawbench as yb
 from yawbench.fmus.archive import runs_as
 from yawbench.fmus.build import HERE as FMUS
 from yawbench.fmus.build import build_all, find_components
-from yawbench.orchestrator.scenario.loader import names
+from yawbench.orchestrator.scenario.catalogue import names
 
 pytestmark = pytest.mark.filterwarnings("ignore::yawbench.YawbenchWarning")
 

@@ -10,7 +10,7 @@ import yawbench as yb
 from yawbench._scenario import Scenario
 from yawbench.metrics.verdict import Status
 from yawbench.orchestrator.plan import Override
-from yawbench.orchestrator.scenario.loader import SHIPPED
+from yawbench.orchestrator.scenario.catalogue import SHIPPED
 from yawbench.proving_ground.sine_with_dwell import evaluate_dwell
 from yawbench.proving_ground.standard_tests import Evaluation
 from yawbench.proving_ground.steering_tests import evaluate_lane_change, evaluate_slow_steer

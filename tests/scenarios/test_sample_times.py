@@ -6,7 +6,7 @@ import pytest
 
 from tests.cars import load_scenario
 from tests.components.test_conformance import COMPONENTS
-from yawbench.orchestrator.scenario.loader import SHIPPED, files
+from yawbench.orchestrator.scenario.catalogue import SHIPPED, files
 
 SCENARIOS = [path for path, _ in files(SHIPPED, ["a scenario"])]
 

@@ -11,7 +11,7 @@ from ruamel.yaml import YAML
 import yawbench as yb
 from tests.checkout import ROOT
 from yawbench.cli import main
-from yawbench.orchestrator.scenario.loader import SHIPPED
+from yawbench.orchestrator.scenario.catalogue import SHIPPED
 from yawbench.studies.axes import level_at
 from yawbench.studies.load_experiment import load_experiment
 from yawbench.studies.tuning import DIGITS, tuning_of

@@ -42,7 +42,7 @@ from yawbench.foundation.safe_files import NO_FOLLOW
 from yawbench.orchestrator.results.file_formats import FILES
 from yawbench.orchestrator.results.reader import FoundRun, found_runs, load_results
 from yawbench.orchestrator.results.run_record import RUN_FILE
-from yawbench.orchestrator.scenario import loader
+from yawbench.orchestrator.scenario import catalogue
 from yawbench.reports.page_parts import Assets, Page, render, static
 from yawbench.reports.viewer import page
 
@@ -243,7 +243,7 @@ class Request(BaseHTTPRequestHandler):
         pages = [(printable(path), f"files/{_quoted(path)}") for path in pages_below(folder)]
         runs = list(runs_below(folder))
         view = ResultsPage(
-            title=f"Results in {folder}", pages=pages, runs=runs, scenarios=loader.names("a scenario"),
+            title=f"Results in {folder}", pages=pages, runs=runs, scenarios=catalogue.names("a scenario"),
             assets=Assets(static("bench.css", __package__), ""),
         )  # fmt: skip
         self._send_own(render(view))
@@ -288,7 +288,7 @@ class Request(BaseHTTPRequestHandler):
 
     def _bench(self, rest: str, query: Query) -> None:
         """Send the bench of a scenario."""
-        names = loader.names("a scenario")
+        names = catalogue.names("a scenario")
         scenario = query.get("scenario", names)[0]
         self._send_own(self.server.bench.page(scenario, names))
 

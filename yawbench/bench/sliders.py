@@ -29,7 +29,7 @@ from yawbench.foundation.messages import hint, short
 from yawbench.foundation.workers import Pool, default_workers
 from yawbench.orchestrator.plan import Instance, Plan
 from yawbench.orchestrator.results.reader import Results
-from yawbench.orchestrator.scenario import loader
+from yawbench.orchestrator.scenario import catalogue
 from yawbench.orchestrator.scenario.overrides import read_changes
 from yawbench.orchestrator.scenario.quantities import convert
 from yawbench.orchestrator.scenario.schema import LoadedScenario
@@ -260,8 +260,8 @@ class Bench:
     def _scenario(self, name: str) -> Path:
         """Return the scenario of a name; a path is refused."""
         if name not in self._paths:
-            known = loader.names("a scenario")
-            path = loader.named(name) if name in known else None
+            known = catalogue.names("a scenario")
+            path = catalogue.named(name) if name in known else None
             if path is None:
                 others = hint(name, known, lead="by name there are")
                 raise ScenarioError(f"there is no scenario {short(name)}{others}", code="scenario-unknown")

@@ -4,16 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from yawbench.commands.options import CHANGES, RunOptions, takes
 from yawbench.commands.output import say
-from yawbench.foundation.errors import ResultsError
-
-if TYPE_CHECKING:
-    pass
 from yawbench.commands.recorded_runs import (
     Labels,
     MeasuredFrom,
@@ -26,6 +22,7 @@ from yawbench.commands.recorded_runs import (
     start_of,
     with_segments,
 )
+from yawbench.foundation.errors import ResultsError
 
 Page = Annotated[Path | None, typer.Option("--out", metavar="FILE.html", help="Page to write.")]
 

@@ -79,7 +79,7 @@ def compare(
 def labelled_recordings(measured: Sequence[Path] | None, begin: str) -> list[LabelledRun]:
     """Return the segments of measurement files, as runs that begin at a time of theirs."""
     from yawbench.figures.display import LabelledRun
-    from yawbench.orchestrator.results.measurement_results import load_run
+    from yawbench.measurements.measured_results import load_run
 
     places, start = with_segments((), measured), start_of(begin)
     labels = distinct(places) if places else []

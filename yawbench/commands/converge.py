@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -20,19 +20,11 @@ from yawbench.foundation.errors import ScenarioError
 from yawbench.foundation.messages import hint, listed
 from yawbench.orchestrator.coupling_algorithms import ALGORITHMS
 
-if TYPE_CHECKING:
-    pass
-
-
 Halvings = Annotated[
     int,
     typer.Option("--halvings", metavar="N", min=2, max=10, help="Number of times the step size is halved."),
 ]
-
-
 Signal = Annotated[str, typer.Option("--signal", metavar="INSTANCE.VARIABLE", help="Signal to compare.")]
-
-
 Algorithms = Annotated[
     list[str] | None,
     typer.Option(

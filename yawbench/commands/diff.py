@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -11,13 +11,7 @@ from yawbench.commands import output
 from yawbench.commands.output import print_tables, say, tabular
 from yawbench.commands.recorded_runs import MeasuredFrom
 
-if TYPE_CHECKING:
-    pass
-
-
 FirstRun = Annotated[Path, typer.Argument(help="Results folder, or measurement file.", metavar="RUN")]
-
-
 SecondRun = Annotated[
     Path, typer.Argument(help="Results folder or measurement file to compare with.", metavar="RUN")
 ]

@@ -22,14 +22,8 @@ from yawbench.commands.evaluate import DRIVE, EvaluatedRuns, angle_of
 
 GROUND = "proving_ground"
 """Folder of the standard tests' scenarios."""
-
-
 DrivenName = Literal[tuple(DRIVEN)]  # type: ignore[valid-type]
-
-
 TestToDrive = Annotated[DrivenName, typer.Argument(help="The test.", metavar="TEST")]  # type: ignore[valid-type]
-
-
 ScenarioOption = Annotated[
     str | None,
     typer.Option(
@@ -38,8 +32,6 @@ ScenarioOption = Annotated[
         help="Scenario of a single run. Default: that of the test in proving_ground.",
     ),
 ]
-
-
 Slow = Annotated[
     str | None,
     typer.Option(
@@ -48,16 +40,12 @@ Slow = Annotated[
         help="Scenario of slowly increasing steer, for A; default: proving_ground/slowly_increasing_steer.",
     ),
 ]
-
-
 VehicleOption = Annotated[
     str | None,
     typer.Option(
         "--vehicle", metavar="FILE", help="Vehicle file, or a name that `yawbench list vehicles` gives."
     ),
 ]
-
-
 StartAngle = Annotated[
     str | None,
     typer.Option(
@@ -66,8 +54,6 @@ StartAngle = Annotated[
         help="A (hand-wheel angle at 0.3 g), such as '35.8 deg'; default: measured by runs.",
     ),
 ]
-
-
 DriveFigures = Annotated[bool, typer.Option("--figures", help="Also draw every run.")]
 
 
@@ -95,12 +81,12 @@ def drive(
     is resumed; finished runs are not repeated.
     """
     from yawbench.orchestrator.results.folder_names import default_folder
-    from yawbench.orchestrator.scenario import loader
+    from yawbench.orchestrator.scenario import catalogue
     from yawbench.studies.driven_tests import TestDriver
 
     chosen = DRIVEN[test]
     changes = (*_vehicle(vehicle), *options.changes)
-    one_run = loader.find(scenario or f"{GROUND}/{str(test).replace('-', '_')}", "a scenario")
+    one_run = catalogue.find(scenario or f"{GROUND}/{str(test).replace('-', '_')}", "a scenario")
     folder = options.out or default_folder(one_run, changes, suffix="_series")
     execute = context.with_resource(executor_of(folder, str(one_run), options, format="parquet"))
     if (angle or slow_steer) and not chosen.needs_angle:
@@ -110,7 +96,7 @@ def drive(
             why = "set by the series itself"
             raise ScenarioError(f"{change.target}: {why}", code="option-invalid")
     steer = f"{GROUND}/slowly_increasing_steer"
-    slow = loader.find(slow_steer or steer, "a scenario") if chosen.needs_angle else None
+    slow = catalogue.find(slow_steer or steer, "a scenario") if chosen.needs_angle else None
     hold(context, folder)
     known = None
     if slow:
@@ -152,8 +138,8 @@ def _vehicle(name: str | None) -> tuple[Override, ...]:
         ScenarioError: the file does not exist.
     """
     from yawbench.orchestrator.plan import Override
-    from yawbench.orchestrator.scenario import loader
+    from yawbench.orchestrator.scenario import catalogue
 
     if name is None:
         return ()
-    return (Override.of("vehicle", str(loader.find(name, "a vehicle file").resolve()), "--vehicle"),)
+    return (Override.of("vehicle", str(catalogue.find(name, "a vehicle file").resolve()), "--vehicle"),)

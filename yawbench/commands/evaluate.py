@@ -24,11 +24,7 @@ if TYPE_CHECKING:
 
 
 TestName = Literal[tuple(TESTS)]  # type: ignore[valid-type]
-
-
 TestToEvaluate = Annotated[TestName, typer.Argument(help="The test.", metavar="TEST")]  # type: ignore[valid-type]
-
-
 EvaluatedSources = Annotated[
     list[Path],
     typer.Argument(
@@ -36,25 +32,17 @@ EvaluatedSources = Annotated[
         metavar="RESULTS...",
     ),
 ]
-
-
 SlowSteer = Annotated[
     list[Path] | None,
     typer.Option(
         "--slow-steer", metavar="RESULTS", help="Runs of slowly increasing steer, for A. Repeatable."
     ),
 ]
-
-
 CharacteristicAngle = Annotated[
     str | None,
     typer.Option("--angle", metavar="ANGLE", help="A, the hand-wheel angle at 0.3 g, such as '35.8 deg'."),
 ]
-
-
 EvaluationFigures = Annotated[bool, typer.Option("--figures/--no-figures", help="Draw every run.")]
-
-
 OutFile = Annotated[
     Path | None,
     typer.Option(
@@ -63,15 +51,9 @@ OutFile = Annotated[
         help="Folder for evaluation.json, evaluation.html and figures. Default: that of the runs.",
     ),
 ]
-
-
 FILE, PAGE = "evaluation.json", "evaluation.html"
-
-
 DRIVE, EVALUATE = "drive", "evaluate"
 """Commands that write evaluations; neither replaces those of the other."""
-
-
 BESIDE = "evaluated"
 """Folder of an evaluation below a folder that has one of another command already."""
 
@@ -92,8 +74,8 @@ def evaluate(
     `yawbench drive`, its runs and its A are taken, and its evaluation is kept: this one goes to a folder
     evaluated in it. Exit status 1 if nothing could be judged.
     """
+    from yawbench.measurements.measured_results import load_run
     from yawbench.orchestrator.results.folder_names import below_results
-    from yawbench.orchestrator.results.measurement_results import load_run
     from yawbench.proving_ground.trace import trace_of
 
     from .recorded_runs import distinct, folder_of_all
@@ -191,7 +173,7 @@ class EvaluatedRuns:
 
 def _runs(source: Path) -> list[Path]:
     """Return the folders of the runs in and below a folder, or the segments of a measurement file."""
-    from yawbench.orchestrator.results.measurement_results import segments_of
+    from yawbench.measurements.measured_results import segments_of
     from yawbench.orchestrator.results.reader import found_runs
     from yawbench.orchestrator.results.run_record import RunStatus
 
@@ -290,7 +272,7 @@ def angle_of(text: str | None) -> float | None:
 
 def _angle(text: str | None, slow_steer: list[Path] | None, test: StandardTest) -> float | None:
     """Return A [rad], None if it is neither given nor needed."""
-    from yawbench.orchestrator.results.measurement_results import load_run
+    from yawbench.measurements.measured_results import load_run
     from yawbench.proving_ground.steering_tests import characteristic_angle, evaluate_slow_steer
     from yawbench.proving_ground.trace import trace_of
 

@@ -18,14 +18,8 @@ Wanted = Annotated[
     Literal["runs", "scenarios", "fmus", "vehicles", "signals", "metrics"] | None,
     typer.Argument(help="What to list. Default: scenarios and vehicles.", metavar="WHAT"),
 ]
-
-
 SCENARIOS = ("a scenario", "a study file", "a sweep file")
-
-
 VEHICLES = ("a vehicle file",)
-
-
 ListedFolder = Annotated[
     Path | None,
     typer.Argument(
@@ -34,8 +28,6 @@ ListedFolder = Annotated[
         metavar="PLACE",
     ),
 ]
-
-
 Units = Annotated[
     bool,
     typer.Option("--units", help="List FMUs and whether each runs natively, or why it runs in Python."),
@@ -52,7 +44,7 @@ def list(options: RunOptions, what: Wanted = None, place: ListedFolder = None, u
     """
     from yawbench.fmus.opener import hidden
     from yawbench.orchestrator.results.reader import found_runs
-    from yawbench.orchestrator.scenario import loader
+    from yawbench.orchestrator.scenario import catalogue
     from yawbench.studies.listings import (
         files_table,
         fmus_in,
@@ -85,7 +77,7 @@ def list(options: RunOptions, what: Wanted = None, place: ListedFolder = None, u
     elif what == "metrics":
         table = metrics_table()
     elif what == "signals" and place is not None:
-        scenario = loader.find(place, "a scenario")
+        scenario = catalogue.find(place, "a scenario")
         table = recorded_table(plan_of_scenario(scenario, options))
     else:
         folder = _folder_of_fmus(place or options.fmus)

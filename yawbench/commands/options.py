@@ -23,19 +23,19 @@ if TYPE_CHECKING:
 
 
 def named(kind: str, **settings: Any) -> Any:
-    """Return an argument for a file of a kind, given as a path or a name (see `scenario.loader`)."""
+    """Return an argument for a file of a kind, given as a path or a name (see `scenario.catalogue`)."""
 
     def find(value: Any) -> Any:
-        from yawbench.orchestrator.scenario import loader
+        from yawbench.orchestrator.scenario import catalogue
 
         if isinstance(value, (list, tuple)):
-            return [loader.find(name, kind) for name in value]
-        return value and loader.find(value, kind)
+            return [catalogue.find(name, kind) for name in value]
+        return value and catalogue.find(value, kind)
 
     def complete(incomplete: str) -> list[str]:
-        from yawbench.orchestrator.scenario import loader
+        from yawbench.orchestrator.scenario import catalogue
 
-        return [name for name in loader.names(kind) if name.startswith(incomplete)]
+        return [name for name in catalogue.names(kind) if name.startswith(incomplete)]
 
     return typer.Argument(callback=find, autocompletion=complete, **settings)
 

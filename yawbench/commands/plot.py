@@ -5,18 +5,13 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 import typer
 
+from yawbench.commands.animate import write_view
 from yawbench.commands.options import CHANGES, MAKING, RunOptions, takes
 from yawbench.commands.output import say
-from yawbench.foundation.errors import ScenarioError
-from yawbench.foundation.messages import listed
-
-if TYPE_CHECKING:
-    pass
-from yawbench.commands.animate import write_view
 from yawbench.commands.recorded_runs import (
     Labels,
     MeasuredFrom,
@@ -29,6 +24,8 @@ from yawbench.commands.recorded_runs import (
     start_of,
     with_segments,
 )
+from yawbench.foundation.errors import ScenarioError
+from yawbench.foundation.messages import listed
 
 Panels = Annotated[
     list[str] | None,
@@ -39,37 +36,23 @@ Panels = Annotated[
         "another (yaw_rate(sideslip)) or path; repeatable. Default: the figures of the papers.",
     ),
 ]
-
-
 AsPage = Annotated[bool, typer.Option("--page", help="Write view.html, an interactive page, instead.")]
-
-
 FileFormat = Annotated[
     Literal["pdf", "svg", "png", "pgf"] | None,
     typer.Option("--format", help="Format of the figure; default: SVG and PNG, or that of --out FILE."),
 ]
-
-
 Size = Annotated[
     str | None,
     typer.Option("--size", metavar="WxHmm", help="Size of the figure: 88x60mm, 9x6cm or 3.5x2.4in."),
 ]
-
-
 Style = Annotated[
     Literal["ieee", "elsevier", "slides"] | None,
     typer.Option(
         "--style", help="Fonts, line widths and column width of a publisher, without title and note."
     ),
 ]
-
-
 _SIZE = re.compile(r"(\d+(?:\.\d+)?)x(\d+(?:\.\d+)?)(mm|cm|in)")
-
-
 _INCH = {"mm": 25.4, "cm": 2.54, "in": 1.0}
-
-
 LARGEST_SIZE = 100.0
 """Largest width or height of a figure [inches]. Chosen: a poster, and its pixels fit into memory."""
 

@@ -25,8 +25,6 @@ RunSources = Annotated[
         help="Results folders, scenarios or measurement files; several are overlaid.", metavar="RESULTS..."
     ),
 ]
-
-
 Labels = Annotated[
     list[str] | None,
     typer.Option(
@@ -42,17 +40,17 @@ def recorded(sources: Sequence[Path], options: RunOptions) -> list[Path]:
         ScenarioError: a scenario or an option is invalid.
     """
     from yawbench.fmus.opener import stale_fmus
+    from yawbench.measurements.measured_results import is_measurement, segments_of
     from yawbench.orchestrator.results.folder_names import default_folder
     from yawbench.orchestrator.results.freshness import staleness
-    from yawbench.orchestrator.results.measurement_results import is_measurement, segments_of
-    from yawbench.orchestrator.scenario import loader
-    from yawbench.orchestrator.scenario.loader import MEASUREMENT
+    from yawbench.orchestrator.scenario import catalogue
+    from yawbench.orchestrator.scenario.catalogue import MEASUREMENT
     from yawbench.planner import Planner
     from yawbench.studies.jobs import Job, execute, ready
 
-    sources = [path if os.path.exists(path) else loader.named(path) or path for path in sources]
-    files = [path for path in sources if path.suffix in loader.ENDINGS and not os.path.isdir(path)]
-    scenarios = [path for path in files if loader.kind_of(path) != MEASUREMENT]
+    sources = [path if os.path.exists(path) else catalogue.named(path) or path for path in sources]
+    files = [path for path in sources if path.suffix in catalogue.ENDINGS and not os.path.isdir(path)]
+    scenarios = [path for path in files if catalogue.kind_of(path) != MEASUREMENT]
     if options.changes and not scenarios:
         raise ScenarioError(
             "--swap, --set and --fault apply to scenarios, not to results folders",
@@ -106,8 +104,8 @@ def labels_of(folders: Sequence[Path], labels: Sequence[str] | None) -> list[str
 
 def folder_of_all(folders: Sequence[Path]) -> Path:
     """Return the folder for figures of all runs: that of a single run, else their common parent."""
+    from yawbench.measurements.measured_results import is_measurement
     from yawbench.orchestrator.results.folder_names import below_results
-    from yawbench.orchestrator.results.measurement_results import is_measurement
 
     if not (own := [folder for folder in folders if not is_measurement(folder)]):
         return below_results("measured", folders[0].stem)
@@ -126,8 +124,6 @@ MeasuredRuns = Annotated[
         "too. Repeatable.",
     ),
 ]
-
-
 MeasuredFrom = Annotated[
     str,
     typer.Option("--from", metavar="TIME", help="Time of the measurements at which the runs begin: '12 s'."),
@@ -154,7 +150,7 @@ def with_segments(folders: Sequence[Path], measured: Sequence[Path] | None) -> l
     Raises:
         ResultsError: a file does not exist.
     """
-    from yawbench.orchestrator.results.measurement_results import segments_of
+    from yawbench.measurements.measured_results import segments_of
 
     return [*folders, *(segment for file in measured or () for segment in segments_of(file))]
 
@@ -169,7 +165,7 @@ def read_runs(places: Sequence[Path], start: float, *, thin: bool = False) -> li
     Raises:
         ResultsError, ScenarioError: one of them cannot be read.
     """
-    from yawbench.orchestrator.results.measurement_results import filtered_alike, is_measurement, load_run
+    from yawbench.measurements.measured_results import filtered_alike, is_measurement, load_run
 
     thin = thin and not any(map(is_measurement, places))
     return filtered_alike([load_run(place, thin=thin, start=start) for place in places])

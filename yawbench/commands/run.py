@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import textwrap
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -15,10 +15,6 @@ from yawbench.foundation.messages import printable
 
 from .options import CHANGES, MAKING, RunOptions, ScenarioFile, plan_of_scenario, takes
 from .output import print_tables, say, shows_bars, tabular
-
-if TYPE_CHECKING:
-    pass
-
 
 MetricsOption = Annotated[
     list[str] | None,

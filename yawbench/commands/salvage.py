@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from yawbench.commands.output import say
 from yawbench.foundation.messages import counted
-
-if TYPE_CHECKING:
-    pass
-
 
 Folders = Annotated[
     list[Path], typer.Argument(help="Results folders of runs that were killed.", metavar="FOLDER...")

@@ -13,12 +13,8 @@ from yawbench.foundation import plugins
 
 KIND_OF_FILE = "kind of file"
 """Kind of plug-ins: models that read YAML files."""
-
-
 ALSO = {"study": "experiment", "sweep": "experiment", "tuning": "experiment"}
 """Names of commands and documents -> kind."""
-
-
 DIALECT = "http://json-schema.org/draft-07/schema#"
 """Chosen: the latest draft that editors implement in full."""
 
@@ -59,8 +55,6 @@ def schema_text(kind: str) -> str:
 
 
 KindName = Literal[tuple([*kinds(), *ALSO])]  # type: ignore[valid-type]
-
-
 Kind = Annotated[
     KindName | None,  # type: ignore[valid-type]
     typer.Argument(help="Kind of file; without it, all kinds are listed.", metavar="KIND"),

@@ -30,8 +30,6 @@ from yawbench.commands.experiments import (
 TuningFile = Annotated[
     Path, named("a tuning file", help="Tuning: YAML file, or a name in scenarios/.", metavar="TUNING")
 ]
-
-
 TuningSeed = Annotated[
     int | None, typer.Option("--seed", min=0, help="Seed of the search, in place of the file's.", metavar="N")
 ]

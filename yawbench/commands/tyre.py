@@ -3,28 +3,20 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 import typer
 
 from yawbench.commands.options import RunOptions, takes
 from yawbench.commands.output import save_figure, say
 
-if TYPE_CHECKING:
-    pass
-
-
 TyreAction = Annotated[
     Literal["show"], typer.Argument(help="show: draw forces, moments, stiffnesses and relaxation lengths.")
 ]
-
-
 TyreSource = Annotated[
     str,
     typer.Argument(metavar="FILE|FMU", help="Tyre property file (.tir), or name or path of a tyre FMU."),
 ]
-
-
 TyreOutput = Annotated[
     Path | None,
     typer.Option(
@@ -33,8 +25,6 @@ TyreOutput = Annotated[
         help="Figure to write, as .svg and .png. Default: results/tyres/<name>.",
     ),
 ]
-
-
 TyreFriction = Annotated[float, typer.Option(min=0.0, help="Friction coefficient of the road.")]
 
 

@@ -62,14 +62,14 @@ def vehicle(
     frequency and damping over speed.
     """
     from yawbench.orchestrator.results.folder_names import below_results
-    from yawbench.orchestrator.scenario import loader, yaml_lines
+    from yawbench.orchestrator.scenario import catalogue, yaml_lines
     from yawbench.orchestrator.scenario.schema import Vehicle
     from yawbench.orchestrator.scenario.schema_validation import validated
     from yawbench.planner import Planner
     from yawbench.proving_ground.handling import TestTrack, draw_cars, fitting_plant, handling_of
     from yawbench.vehicles.suspicious_values import suspicious_vehicle
 
-    file = loader.find(file, "a vehicle file")
+    file = catalogue.find(file, "a vehicle file")
     document = yaml_lines.read(file, what="vehicle file")
     spec = validated(Vehicle, document)
     for warning in suspicious_vehicle(spec.values):

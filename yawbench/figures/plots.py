@@ -48,8 +48,6 @@ OVERVIEW = (
     "path",
 )
 """The panels of the figures in the papers."""
-
-
 FAULTY = "#F7DDC8"
 """Colour of fault spans; pale enough for all lines and the grid."""
 SPAN: dict[str, Any] = {"color": FAULTY, "linewidth": 8.0, "linestyle": "-", "solid_capstyle": "butt"}

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 from yawbench.foundation.errors import ResultsError
 from yawbench.foundation.messages import cut, printable
 from yawbench.foundation.safe_files import reason, write_whole
-from yawbench.orchestrator.results.measurement_results import MeasuredResults
+from yawbench.measurements.measured_results import MeasuredResults
 from yawbench.orchestrator.results.reader import Results
 
 if TYPE_CHECKING:

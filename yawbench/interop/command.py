@@ -136,8 +136,6 @@ ArchiveOption = Annotated[
         "--out", metavar="FILE", help="Archive to write. Default: <scenario>.ssp in the working directory."
     ),
 ]
-
-
 Standard = Annotated[
     Literal["1.0", "2.0"] | None,
     typer.Option("--standard", help="Version of SSP. Default: 1.0, or 2.0 for FMUs of FMI 3.0."),

@@ -58,8 +58,6 @@ from yawbench.orchestrator.scenario.ssp_archive import (
 )
 
 _FILE_TIME = (1980, 1, 1, 0, 0, 0)
-
-
 Version = Literal["1.0", "2.0"]
 """Version of the SSP standard; for FMUs of FMI 2.0, the files written differ only in this number."""
 OLD_TYPES = {"Float64": "Real", "Int32": "Integer"}

@@ -13,7 +13,7 @@ PLUGINS = {
     },
     "kind of file": {
         "bands": "yawbench.measured_cars.validation:BandsSpec",
-        "fit": "yawbench.measured_cars.fit:FitSpec",
+        "fit": "yawbench.measured_cars.fit_file:FitSpec",
     },
     "section of a study": {"validations": "yawbench.measured_cars.of_studies:VALIDATIONS"},
     "library": {

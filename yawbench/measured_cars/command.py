@@ -15,7 +15,7 @@ from yawbench.foundation.errors import ScenarioError
 from yawbench.foundation.messages import resolved, span
 
 if TYPE_CHECKING:
-    from yawbench.orchestrator.recordings.measurement import Measurement
+    from yawbench.measurements.measurement import Measurement
     from yawbench.planner import Planner
     from yawbench.studies.tables import Table
 
@@ -52,7 +52,7 @@ def measured(action: MeasuredAction, file: MeasurementFile, out: FigureFile = No
     match the recorded position. The table of effects shows which parameters of a car the recording
     determines. Exit status 1 if there is any flaw.
     """
-    from yawbench.orchestrator.recordings.measurement import load_measurement
+    from yawbench.measurements.measurement import load_measurement
     from yawbench.studies.tables import Cell, Table
 
     from .flaws import FlawKind, flaws_of, not_examined
@@ -107,8 +107,8 @@ def effects_table(measurement: Measurement) -> Table:
     Raises:
         ValueError: steering, speed, mass or axles are not known.
     """
+    from yawbench.measurements.measurement import MEASURABLE
     from yawbench.metrics.expressions import MetricValue
-    from yawbench.orchestrator.recordings.measurement import MEASURABLE
     from yawbench.studies.tables import Table
 
     from .single_track import CHANGE, SEEN, effects_in
@@ -136,7 +136,7 @@ def draw_measurement(file: Path, measurement: Measurement, out: Path) -> None:
     from yawbench.figures.display import LabelledRun
     from yawbench.figures.plots import draw
     from yawbench.figures.style import KINDS, save
-    from yawbench.orchestrator.results.measurement_results import (
+    from yawbench.measurements.measured_results import (
         filtered_alike,
         measured_results,
         segments_of,
@@ -174,7 +174,7 @@ def fit(context: typer.Context, file: FitFile, options: RunOptions) -> None:
     from yawbench.orchestrator.results.folder_names import default_folder
     from yawbench.planner import Planner
 
-    from .fit import load_fit
+    from .fit_file import load_fit
     from .fit_page import fit_page, parameter_table, score_table
     from .fit_result import make_fit
     from .least_squares import CONVERGED
@@ -209,7 +209,7 @@ def vehicle_text(result: FitResult, folder: Path, planner: Planner) -> str:
 
     from yawbench.orchestrator.signal_names import Target
 
-    from .fit import MEASURED
+    from .fit_file import MEASURED
 
     fit, model = result.fit, result.scenario
     scenario = planner.load(fit.scenario)
@@ -264,8 +264,8 @@ def validate(
     from yawbench.commands.recorded_runs import recorded
     from yawbench.figures.style import save
     from yawbench.foundation.safe_files import write_whole
-    from yawbench.orchestrator.recordings.measurement import load_measurement
-    from yawbench.orchestrator.results.measurement_results import load_run
+    from yawbench.measurements.measured_results import load_run
+    from yawbench.measurements.measurement import load_measurement
 
     from .validation import compare_run, load_bands
     from .validation_page import conditions_table, validation_page, validation_table

@@ -12,8 +12,8 @@ from yawbench.figures.display import LabelledRun, shown_unit
 from yawbench.foundation.messages import counted, span
 from yawbench.measured_cars.fit_result import PARTS, FitResult, FittedModel
 from yawbench.measured_cars.least_squares import LEAST_PIECES
+from yawbench.measurements.measured_results import MeasuredResults
 from yawbench.metrics.expressions import MetricValue
-from yawbench.orchestrator.results.measurement_results import MeasuredResults
 from yawbench.orchestrator.results.reader import Results
 from yawbench.reports.evaluation_page import drawn
 from yawbench.reports.page_parts import Document, render
@@ -23,8 +23,6 @@ from yawbench.vocabulary.signals import SIGNALS
 
 BINS = 4
 """Number of ranges of acceleration and speed, equal in samples. Chosen: enough to see a trend."""
-
-
 OVER = ("acceleration_y", "velocity_x")
 
 

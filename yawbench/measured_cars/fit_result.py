@@ -30,7 +30,7 @@ from yawbench.vocabulary.facts import FACTS
 from yawbench.vocabulary.signals import SIGNALS
 from yawbench.vocabulary.vehicle import CAR
 
-from .fit import MARGIN, MEASURED, FitWindow, FreeSpec, LoadedFit, ScenarioModel, delay_and_offset, number_in
+from .fit_file import MEASURED, FitWindow, FreeSpec, LoadedFit, number_in
 from .least_squares import (
     CONFIDENCE,
     Estimate,
@@ -42,6 +42,7 @@ from .least_squares import (
     as_measured,
     estimate,
 )
+from .scenario_model import MARGIN, ScenarioModel, delay_and_offset
 from .single_track import SIGNALS as OF_SINGLE_TRACK
 from .single_track import UNITS, SingleTrack, SingleTrackWindow, start_states, typical_values
 

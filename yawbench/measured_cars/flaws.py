@@ -22,9 +22,9 @@ import numpy as np
 
 from yawbench.foundation.errors import ScenarioError
 from yawbench.foundation.messages import counted, listed
+from yawbench.measurements.measurement import MEASURABLE, Measurement, load_measurement
+from yawbench.measurements.segment import LowPass, Segment, running_median, without_spikes
 from yawbench.orchestrator.recordings.gaps import Gap, by_signals
-from yawbench.orchestrator.recordings.measurement import MEASURABLE, Measurement, load_measurement
-from yawbench.orchestrator.recordings.segment import LowPass, Segment, running_median, without_spikes
 from yawbench.vehicles.motion import standing
 from yawbench.vocabulary.motion import ANGLES
 

@@ -11,7 +11,7 @@ from yawbench import arguments
 from yawbench._progress import bar
 from yawbench.planner import Planner
 
-from .fit import load_fit
+from .fit_file import load_fit
 from .fit_result import FitResult, FittedModel, make_fit
 
 if TYPE_CHECKING:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from yawbench import arguments
 from yawbench._run import Run
-from yawbench.orchestrator.recordings.measurement import load_measurement
+from yawbench.measurements.measurement import load_measurement
 
 from .validation import BANDS, Validation, compare_run, load_bands
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from pydantic import Field
 
-from yawbench.orchestrator.recordings.measurement import Measurement, load_measurement
+from yawbench.measurements.measurement import Measurement, load_measurement
 from yawbench.orchestrator.results.reader import Results
 from yawbench.orchestrator.scenario.schema_validation import StrictModel
 from yawbench.studies.claim_schema import RunName

@@ -24,8 +24,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from yawbench.orchestrator.recordings.measurement import Measurement
-from yawbench.orchestrator.recordings.segment import Segment
+from yawbench.measurements.measurement import Measurement
+from yawbench.measurements.segment import Segment
 from yawbench.vehicles.motion import standing
 from yawbench.vocabulary.gravity import G
 

@@ -35,12 +35,12 @@ from yawbench.figures.style import CHANGED, frame, line_style, new_figure
 from yawbench.foundation.errors import Diagnostic, ResultsError, ScenarioError, code_of, warnings_in
 from yawbench.foundation.messages import counted, hint, resolved
 from yawbench.foundation.safe_files import reads
+from yawbench.measurements.measurement import Measurement
+from yawbench.measurements.segment import Segment
 from yawbench.metrics.measures import words
 from yawbench.metrics.verdict import Verdict, apart, compare, not_judged, worded, worst
-from yawbench.orchestrator.recordings.measurement import Measurement
-from yawbench.orchestrator.recordings.segment import Segment
 from yawbench.orchestrator.results.reader import Results
-from yawbench.orchestrator.scenario import loader, yaml_lines
+from yawbench.orchestrator.scenario import catalogue, yaml_lines
 from yawbench.orchestrator.scenario.quantities import convert
 from yawbench.orchestrator.scenario.schema_validation import StrictModel, validated
 from yawbench.orchestrator.scenario.yaml_lines import Document
@@ -138,7 +138,7 @@ def load_bands(name: str | Path) -> Bands:
     Raises:
         ScenarioError: there is no such file, or it is invalid; lists all errors.
     """
-    path = loader.find(name, "a file of bands")
+    path = catalogue.find(name, "a file of bands")
     document = yaml_lines.read(path, what="file of bands")
     spec = validated(BandsSpec, document)
     tolerances = {name: _tolerance(document, name, tolerance) for name, tolerance in spec.bands.items()}

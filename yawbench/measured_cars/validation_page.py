@@ -10,9 +10,9 @@ from markupsafe import Markup
 from yawbench.figures.display import LabelledRun, shown
 from yawbench.foundation.messages import listed
 from yawbench.measured_cars.validation import Validation
+from yawbench.measurements.measured_results import MeasuredResults
 from yawbench.metrics.measures import words
 from yawbench.metrics.verdict import SYMBOLS, apart, worded
-from yawbench.orchestrator.results.measurement_results import MeasuredResults
 from yawbench.orchestrator.results.reader import Results
 from yawbench.reports.evaluation_page import drawn
 from yawbench.reports.page_parts import Document, render

@@ -33,8 +33,6 @@ The strip |B1 beta + B2 dbeta/dt| < 1 is that of He, Crolla, Levesley, Manning, 
 steering, driveline, and braking for integrated vehicle dynamics, Proc. IMechE D 220 (2006). Chosen:
 B1 = 4/24 and B2 = 1/24 s per degree, values in common use; they are not measured on these cars.
 """
-
-
 JERK_WINDOW = 0.1
 """Averaging time of a signal before its slope is taken [s]. Chosen: the plain difference quotient of an
 acceleration is the jump at a controller's samples; people feel some 10 Hz at most."""

@@ -66,8 +66,6 @@ def worded(status: Status, of: Judged = "criteria") -> VerdictText:
 
 
 WORST_FIRST = (Status.FAILED, Status.NOT_JUDGED, Status.SENSITIVE, Status.UNDECIDED, Status.PASSED)
-
-
 PERCENT = "%"
 """Unit that says how a ratio is shown: its number and its unit stay those of a ratio, 1."""
 

@@ -26,11 +26,11 @@ from typing import Any
 import numpy as np
 
 from yawbench.foundation.errors import ResultsError
+from yawbench.measurements.segment import LowPass, even_grid, resample
 from yawbench.metrics.expressions import columns_of
 from yawbench.metrics.measures import si_of
 from yawbench.metrics.verdict import NotJudged
 from yawbench.orchestrator.recordings.gaps import gaps_noted
-from yawbench.orchestrator.recordings.segment import LowPass, even_grid, resample
 from yawbench.orchestrator.results.reader import Results
 from yawbench.orchestrator.results.run_record import FmuRecord
 from yawbench.orchestrator.scenario.overrides import with_changes

@@ -20,7 +20,7 @@ from yawbench.components.fmi.component import Component
 from yawbench.foundation.errors import ScenarioError
 from yawbench.foundation.messages import hint
 from yawbench.orchestrator.results.folder_lock import writing
-from yawbench.orchestrator.scenario import loader
+from yawbench.orchestrator.scenario import catalogue
 from yawbench.studies.executor import Executor
 from yawbench.studies.jobs import Job, OnOutcome, Outcome, run_job
 from yawbench.studies.tables import to_pandas
@@ -84,7 +84,7 @@ def rank(
     progress = None if progress is None else arguments.flag(progress, "progress")
     workers = None if workers is None else arguments.count(workers, "workers")
     kept_in = None if out is None else arguments.path(out, "out")
-    file = loader.find(arguments.path(ranking, "ranking"), "a ranking file")
+    file = catalogue.find(arguments.path(ranking, "ranking"), "a ranking file")
     more, programs = _entries(controller, arguments.text(name, "name", empty=True))
     loaded = load_ranking(file, more=more, quick=quick, chosen=chosen)
     wanted = set(loaded.entries if others is None else others)

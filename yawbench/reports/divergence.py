@@ -10,9 +10,9 @@ import numpy as np
 
 from yawbench.figures.display import shown, unit_of_signal
 from yawbench.foundation.messages import counted, resolved, span, star
+from yawbench.measurements.measured_results import MeasuredResults
 from yawbench.metrics.expressions import angles_in, standing_in
 from yawbench.orchestrator.recordings.gaps import gaps_noted, outside
-from yawbench.orchestrator.results.measurement_results import MeasuredResults
 from yawbench.orchestrator.results.reader import Results
 from yawbench.orchestrator.results.run_record import RunRecord
 from yawbench.orchestrator.signal_names import SignalName

@@ -34,8 +34,6 @@ MOTION = (
     "velocity_x", "velocity_y", "sideslip", "yaw_rate", "steer_angle", "yaw_moment", "cone_overrun",
     "path_offset",
 )  # fmt: skip
-
-
 OF_WHEELS = ("force_along", "force_across", "load", "friction")
 """Signals of each wheel that `road_of` draws."""
 

@@ -18,9 +18,9 @@ from yawbench.figures.display import LabelledRun
 from yawbench.figures.phase_portrait import signals_of
 from yawbench.foundation.errors import ResultsError
 from yawbench.foundation.messages import counted, listed
+from yawbench.measurements.measured_results import filtered_alike
 from yawbench.metrics.expressions import evaluate, metric
 from yawbench.orchestrator.plan import Plan
-from yawbench.orchestrator.results.measurement_results import filtered_alike
 from yawbench.orchestrator.results.reader import Results
 from yawbench.orchestrator.results.record_of_plan import run_record
 from yawbench.orchestrator.results.run_folder import load_record

@@ -23,9 +23,9 @@ from yawbench.figures.style import LINES, MEASURED_LINE, line_style
 from yawbench.foundation.errors import ResultsError
 from yawbench.foundation.messages import listed
 from yawbench.foundation.safe_files import write_whole
+from yawbench.measurements.measured_results import MeasuredResults
 from yawbench.metrics.expressions import MetricValue, columns_of, evaluate, metric, reference_of, while_moving
 from yawbench.metrics.measures import words
-from yawbench.orchestrator.results.measurement_results import MeasuredResults
 from yawbench.orchestrator.results.reader import Results
 from yawbench.orchestrator.results.run_record import RunStatus
 from yawbench.orchestrator.scenario.overrides import with_changes

@@ -83,8 +83,6 @@ QuantityText = Annotated[
     WithJsonSchema(_QUANTITY),
 ]
 """A number in SI units, or text with a number and its unit."""
-
-
 CELLS = 10_000
 """Largest number of cells in a grid. Chosen: a hundred times our largest."""
 

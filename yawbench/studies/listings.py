@@ -29,7 +29,7 @@ from yawbench.metrics.measures import catalogue as measures
 from yawbench.metrics.measures import si_of, symbol
 from yawbench.orchestrator.plan import Plan
 from yawbench.orchestrator.results.reader import FoundRun, Results, load_results
-from yawbench.orchestrator.scenario import loader
+from yawbench.orchestrator.scenario import catalogue
 from yawbench.orchestrator.scenario.overrides import changed, with_changes
 from yawbench.vocabulary.motion import LEAST_SPEED
 from yawbench.vocabulary.wheels import WHEELS
@@ -125,16 +125,16 @@ def files_table(folder: Path | None, kinds: Sequence[str]) -> Table:
         raise ScenarioError(f"{folder}: there is no such folder", code="file-missing")
     table = Table("", ["name" if folder is None else "file", "kind", "title"])
     rows: dict[str, Sequence[Cell]] = {}
-    for base in loader.folders() if folder is None else [folder]:
-        for path, kind in loader.files(base, kinds):
+    for base in catalogue.folders() if folder is None else [folder]:
+        for path, kind in catalogue.files(base, kinds):
             archive = path.suffix == ".ssp"
-            title = "" if archive else loader.title_of(path)
-            by_name = folder is None and kind in loader.COMMANDS
+            title = "" if archive else catalogue.title_of(path)
+            by_name = folder is None and kind in catalogue.COMMANDS
             name = path.relative_to(base).with_suffix("").as_posix() if by_name else str(path)
             rows.setdefault(name, [name, "SSP archive" if archive else kind.partition(" ")[2], title or None])
     table.rows = [*rows.values()]
     if not table.rows:
-        where = folder or " and ".join(map(str, loader.folders()))
+        where = folder or " and ".join(map(str, catalogue.folders()))
         raise ScenarioError(f"{where}: holds no file that is {' or '.join(kinds)}", code="file-wrong-kind")
     return table
 

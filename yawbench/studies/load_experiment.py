@@ -19,7 +19,7 @@ from yawbench.foundation.errors import ScenarioError
 from yawbench.foundation.messages import hint, short
 from yawbench.foundation.safe_files import reads
 from yawbench.orchestrator.plan import Override
-from yawbench.orchestrator.scenario import loader, yaml_lines
+from yawbench.orchestrator.scenario import catalogue, yaml_lines
 from yawbench.orchestrator.scenario.schema_validation import validated
 from yawbench.orchestrator.scenario.yaml_lines import Document, KeyPath
 from yawbench.orchestrator.signal_names import Target
@@ -48,8 +48,6 @@ LONGEST = 100
 """Characters of a folder name. Chosen: more do not fit into file names where a letter takes two bytes."""
 _FOLDER = re.compile(rf"[\w.+-]{{1,{LONGEST}}}")
 Texts = TypeVar("Texts", Claim, DerivedSpec)
-
-
 SCENARIOS = Path("scenarios")
 """Folder searched for studies if none is given."""
 
@@ -62,7 +60,9 @@ def found_studies(folder: Path = SCENARIOS) -> list[Path]:
     Raises:
         ScenarioError: there are none.
     """
-    titles = {path: loader.title_of(path) for path, _ in loader.files(folder, ["a study file"], depth=2)}
+    titles = {
+        path: catalogue.title_of(path) for path, _ in catalogue.files(folder, ["a study file"], depth=2)
+    }
     if not titles:
         raise ScenarioError(
             f"no study file was named, and there is none in {folder}/*/", code="file-wrong-kind"

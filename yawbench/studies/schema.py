@@ -276,8 +276,6 @@ FIGURE_KINDS = {
     "grid": FigureKind("grid", "axis_figures:GridDrawing"),
 }
 """Name -> kind of figure."""
-
-
 ShownAxis = Annotated[str, NameOf("axis or run")]
 Chosen = Annotated[
     list[Scalar],

@@ -11,6 +11,8 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, ClassVar
 
 from yawbench.fmus.fmu import Fmu, Value
 from yawbench.foundation.errors import Diagnostic, YawbenchError, code_of
@@ -18,7 +20,11 @@ from yawbench.foundation.messages import listed
 from yawbench.orchestrator.plan import LITERATURE, Given, Instance, ValueOrigin, ValueSource
 from yawbench.orchestrator.scenario.schema import PARAMETERS
 from yawbench.orchestrator.wiring.context import WiringContext
-from yawbench.orchestrator.wiring.parameters import Domain, Parameters, is_parameter, of_file, value_for
+from yawbench.orchestrator.wiring.domain import Domain
+from yawbench.orchestrator.wiring.parameters import Parameters, is_parameter, of_file, value_for
+from yawbench.vocabulary.friction_table import table_of
+from yawbench.vocabulary.patches import patches_of
+from yawbench.vocabulary.signals import SYMBOLS
 from yawbench.vocabulary.vehicle import CAR
 from yawbench.vocabulary.wheels import WHEELS
 
@@ -34,6 +40,9 @@ from .derivations import (
 )
 from .suspicious_values import suspicious_values
 
+if TYPE_CHECKING:
+    from yawbench.measurements.measurement import Measurement
+
 TYRE_FORCES = tuple(f"tyre_force_y_{wheel}" for wheel in WHEELS)
 """Outputs that identify an instance as tyres."""
 TyreMeasurement = Callable[[Instance, Mapping[str, float]], Mapping[str, float]]
@@ -47,11 +56,20 @@ def cars(measure: TyreMeasurement | None = None) -> Domain:
         measure: measures the cornering stiffness of tyres, for instances that need it if the vehicle file
             does not give it (see `tyre_stand.cornering_stiffness`).
     """
-    return Domain(partial(CarParameters, measure=measure), suspicious_values)
+    return Domain(partial(CarParameters, measure=measure), suspicious_values, SYMBOLS, _measured)
+
+
+def _measured(path: Path) -> Measurement:
+    from yawbench.measurements.measurement import load_measurement  # NumPy takes long to import
+
+    return load_measurement(path)
 
 
 class CarParameters(Parameters):
     """The parameters of all instances, with those that follow from the car's and from tyre property files."""
+
+    known = CAR
+    written: ClassVar = {"patches": patches_of, "friction_table": table_of}
 
     def __init__(self, system: WiringContext, measure: TyreMeasurement | None = None) -> None:
         super().__init__(system)

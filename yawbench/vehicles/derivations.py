@@ -126,8 +126,6 @@ DERIVATIONS = (
 )
 NEUTRAL = {"front_unsprung_share": 0.5}
 """Defaults of quantities that nothing gives, as in the plants: equal unsprung masses of both axles."""
-
-
 GIVES_WAY = {
     "mass": ("sprung_mass", "unsprung_mass"),
     "sprung_mass": ("mass", "unsprung_mass"),

@@ -1,14 +1,4 @@
-"""Gymnasium environments of standard tests, for training controllers.
-
-    import gymnasium
-    import yawbench.gym
-
-    env = gymnasium.make("yawbench/sine-with-dwell-v0")
-    observation, info = env.reset(seed=1)
-    observation, reward, terminated, truncated, info = env.step([0.2])
-
-`as_controller` turns a trained policy into a controller, for `Scenario.swap` and `rank`.
-"""
+"""Sine with dwell as an environment of Gymnasium, and policies as controllers."""
 
 from __future__ import annotations
 
@@ -19,15 +9,13 @@ from pathlib import Path
 from queue import SimpleQueue
 from typing import Any
 
+import gymnasium
 import numpy as np
 
-try:
-    import gymnasium
-except ImportError:
-    raise ImportError(
-        'yawbench.gym needs Gymnasium: python -m pip install "yawbench[gym]"', name="gymnasium"
-    ) from None
-
+from yawbench import arguments
+from yawbench._run import Run
+from yawbench._run_many import opener_of
+from yawbench._scenario import load
 from yawbench.foundation.errors import ScenarioError
 from yawbench.metrics.plausibility import PlausibilityWatch
 from yawbench.orchestrator.master.simulate import simulate_in_memory
@@ -35,13 +23,6 @@ from yawbench.orchestrator.plan import Plan
 from yawbench.orchestrator.results.reader import Results
 from yawbench.proving_ground.sine_with_dwell import SPUN, amplitudes
 from yawbench.vocabulary.motion import LEAST_SPEED
-
-from . import arguments
-from ._run import Run
-from ._run_many import opener_of
-from ._scenario import load
-
-__all__ = ["SIGNALS", "SineWithDwell", "as_controller"]
 
 ID = "yawbench/sine-with-dwell-v0"
 SCENARIO = "proving_ground/sine_with_dwell"
@@ -293,7 +274,3 @@ def _positive(value: Any, name: str) -> float:
     if number <= 0.0:
         raise ScenarioError(f"{name}: must be above 0 (got {number:g})", code="argument-invalid")
     return number
-
-
-if ID not in gymnasium.registry:
-    gymnasium.register(id=ID, entry_point=f"{__name__}:SineWithDwell")

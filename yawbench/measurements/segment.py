@@ -19,9 +19,8 @@ import numpy as np
 
 from yawbench.foundation.errors import InvalidValueError
 from yawbench.foundation.messages import span
+from yawbench.orchestrator.recordings.gaps import Gap, outside, parts_between
 from yawbench.vocabulary.motion import LEAST_SPEED
-
-from .gaps import Gap, outside, parts_between
 
 Position = tuple[float, float, float]
 """x, y, z [m] relative to the centre of mass, vehicle axes."""

@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 
 from yawbench.foundation.errors import ResultsError
+from yawbench.orchestrator.recordings.gaps import notes_on
+from yawbench.orchestrator.results.reader import Results, load_results
+from yawbench.orchestrator.results.run_record import FmuRecord, RunRecord, RunStatus
 
-from ..recordings.gaps import notes_on
-from ..recordings.measurement import ENDINGS, MEASURABLE, load_measurement
-from ..recordings.segment import LowPass, even_grid
-from .reader import Results, load_results
-from .run_record import FmuRecord, RunRecord, RunStatus
+from .measurement import ENDINGS, MEASURABLE, load_measurement
+from .segment import LowPass, even_grid
 
 STEERING = ("steering_wheel_angle", "steer_angle", "drive_force")
 """Measured signals that a driver gives in simulations."""

@@ -46,17 +46,29 @@ from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
 from yawbench.foundation.errors import Diagnostic, InvalidValueError, Location, ScenarioError, code_of
 from yawbench.foundation.messages import counted, hint, listed, short, span
 from yawbench.foundation.safe_files import reads
+from yawbench.orchestrator.recordings.clocks import PACKED, UNIX, holds_times, seconds_of
+from yawbench.orchestrator.recordings.gaps import Gap, Samples, between_gaps, gaps_in, notes_on
+from yawbench.orchestrator.recordings.recording_formats import (
+    ColumnFile,
+    FileColumn,
+    numbers_in,
+    reading_series,
+    unit_of,
+)
+from yawbench.orchestrator.recordings.units_of_loggers import how_to_give, unit_in_file
+from yawbench.orchestrator.scenario import yaml_lines
+from yawbench.orchestrator.scenario.quantities import convert, meant_unit, measure_of
+from yawbench.orchestrator.scenario.schema_validation import (
+    StrictModel,
+    quantities_in,
+    text_in_unit,
+    validate,
+)
+from yawbench.orchestrator.scenario.yaml_lines import Document, KeyPath
 from yawbench.vocabulary.signals import SIGNALS, SignalEntry
 from yawbench.vocabulary.vehicle import CAR
 from yawbench.vocabulary.wheels import wheels
 
-from ..scenario import yaml_lines
-from ..scenario.quantities import convert, measure_of
-from ..scenario.schema_validation import StrictModel, quantities_in, text_in_unit, validate
-from ..scenario.yaml_lines import Document, KeyPath
-from .clocks import PACKED, UNIX, holds_times, seconds_of
-from .gaps import Samples, between_gaps, gaps_in, notes_on
-from .recording_formats import ColumnFile, FileColumn, numbers_in, reading_series, refuse_implausible, unit_of
 from .segment import (
     MOVED,
     POLES,
@@ -68,7 +80,6 @@ from .segment import (
     to_centre_of_mass,
     without_spikes,
 )
-from .units_of_loggers import how_to_give, unit_in_file
 
 MEASURABLE: dict[str, SignalEntry] = {name: entry for key, entry in SIGNALS.items() for name in wheels(key)}
 """Signals that a measurement may have, those of wheels one by one."""
@@ -80,6 +91,8 @@ OF_CAR = {name: entry.unit for name, entry in CAR.items()} | {"friction": "1"}
 """Known quantities of a car and its road, with their units."""
 OF_TEST = {"action_time": "s"}
 """Values that tests need beside signals and vehicle, with their units."""
+SHARE_OF_SPIKES = 0.01
+"""Share of samples that may exceed the largest plausible value; chosen: accelerometers have spikes."""
 
 
 def _unit(text: str) -> str:
@@ -249,6 +262,10 @@ class Measurement:
         if name not in segment.signals:
             raise ValueError(f"has no signal {name!r}{hint(name, segment.signals, lead='it has')}")
         return FileColumn(segment.time, segment.signals[name], "s", MEASURABLE[name].unit)
+
+    def gaps(self, name: str, number: int | None = None) -> tuple[Gap, ...]:
+        """Return where a signal of a segment has no samples (see `segment`)."""
+        return tuple(self.segment(number).gaps.get(name, ()))
 
     def segment(self, number: int | None = None) -> Segment:
         """Return a segment by its number, counted from 1; None: the only one.
@@ -487,6 +504,31 @@ class _Reader:
             signal: correction.at for signal, correction in self.corrections.items() if any(correction.at)
         }
         return replace(segment, signals=to_centre_of_mass(segment, positions)) if positions else segment
+
+
+def refuse_implausible(
+    name: str, entry: SignalEntry, column: str, recorded: np.ndarray, values: np.ndarray, unit: str
+) -> None:
+    """Raise ValueError if values of a signal are implausible for a car; suggest the unit that was meant.
+
+    Args:
+        name, entry: the signal.
+        column: heading of its column.
+        given: the numbers of the column, in `unit`.
+        values: the same in SI.
+        unit: unit of the column.
+    """
+    largest, wanted = entry.largest, entry.unit
+    values = values[~np.isnan(values)]
+    if largest is None or np.mean(np.abs(values) > largest) <= SHARE_OF_SPIKES:
+        return
+    number = float(np.nanquantile(np.abs(recorded.astype(float)), 1.0 - SHARE_OF_SPIKES))
+    likely = meant_unit(number, unit, wanted, lambda value: abs(value) <= largest)
+    value = f"{number:.4g} {unit}" if unit != "1" else f"{number:.4g}"
+    raise ValueError(
+        f"column {column!r}: no car reaches {name} of {value}, "
+        f"at most {largest:.4g} {wanted} is allowed{f'; did you mean {likely!r}?' if likely else ''}"
+    )
 
 
 def _held(labels: np.ndarray) -> np.ndarray:
