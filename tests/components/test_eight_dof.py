@@ -268,31 +268,6 @@ def test_braking_agrees_with_an_independent_solution():
     measured("cars", car, SCIPY, error.max(), at_most=3e-4)  # the torque steps at the start
 
 
-def test_left_and_right_are_mirrored_to_the_last_bit():
-    names = ["velocity_x", "yaw_rate", "roll_angle", "position_y", "vertical_load_fl", "wheel_speed_rl"]
-    mirrored = ["velocity_x", "yaw_rate", "roll_angle", "position_y", "vertical_load_fr", "wheel_speed_rr"]
-    setting = {"mu": 0.9, "until": 1.5, "torque": (-200.0,), "initial_speed": 25.0}
-    left = drive(Dugoff, steer=0.08, record=names, **setting)
-    right = drive(Dugoff, steer=-0.08, record=mirrored, **setting)
-    difference = np.abs(left - right * np.array([[1.0], [-1.0], [-1.0], [-1.0], [1.0], [1.0]])).max()
-    measured("mirror", "plant_eight_dof", "its mirror image", difference, at_most=0.0)
-    assert np.ptp(left[1]) > 0.4
-
-
-def test_a_step_with_held_inputs_may_be_split():
-    held = {"steer_angle": 0.05, **lateral(3000.0), **four("tyre_force_x", 100.0, -300.0, 200.0, -100.0)}
-    torque = four("wheel_torque", -20.0, -60.0, 50.0, -30.0)
-    ends = []
-    for parts in (1, 5):
-        stand = Stand(EightDof, initial_speed=25.0, slip_stiffness_per_load=0.0)
-        stand.start(**held, **torque)
-        for _ in range(100 * parts):
-            y = stand.step(0.005 / parts)
-        ends.append(y)
-    for name, value in ends[0].items():
-        assert value == pytest.approx(ends[1][name], rel=1e-6, abs=1e-6), name
-
-
 def test_lifted_wheels_carry_nothing_and_the_others_carry_the_car():
     stand = Stand(EightDof, initial_speed=20.0, cg_height=0.9, roll_centre_height_front=0.5)
     y = stand.start(**lateral(14000.0))
