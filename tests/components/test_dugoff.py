@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import atan, hypot, isfinite, pi, radians, sin, tan
+from math import atan, hypot, pi, radians, sin, tan
 
 import numpy as np
 import pytest

@@ -159,16 +159,6 @@ def test_coasting_down_matches_the_closed_form_of_drag_and_rolling_resistance():
     assert speed[-1] == pytest.approx(terminal * tan(atan(30.0 / terminal) - rate * 10.0), rel=1e-4)
 
 
-@pytest.mark.parametrize("tyre", [Dugoff, MagicFormula])
-@pytest.mark.sampled(1)
-def test_rolling_resistance_stops_the_car_and_does_not_drive_it_back(tyre):
-    names = ["velocity_x", *four("wheel_speed", 0.0)]
-    speed, *spins = drive(tyre, until=4.0, record=names, initial_speed=0.2)
-    assert speed.min() >= 0.0 and speed[-1] < 1e-6
-    assert np.diff(speed).max() <= 0.0
-    assert np.max(spins) > 0.5 and np.min(spins) == 0.0 == np.max(np.array(spins)[:, -1000:])
-
-
 def test_torque_against_the_rolling_resistance_keeps_the_car_rolling_without_slip():
     front, rear = (P.rolling_resistance * 0.313 * 0.5 * P.mass * G * arm / 2.6 for arm in (1.56, 1.04))
     names = ["velocity_x", *four("slip_ratio", 0.0)]
@@ -330,37 +320,6 @@ def test_driving_torque_turns_a_backward_rolling_wheel_forward():
     for _ in range(100):
         y = stand.step(1e-3, **four("wheel_torque", 400.0))
     assert y["wheel_speed_rl"] > 5.0
-
-
-@pytest.mark.parametrize("torque", [0.0, -1000.0])
-def test_a_car_at_rest_stays_at_rest(torque):
-    names = ["velocity_x", "velocity_y", "yaw_rate", "roll_angle", "wheel_speed_fl", "position_x"]
-    run = drive(MagicFormula, until=0.5, record=names, torque=(torque,), initial_speed=0.0)
-    assert not run.any()
-
-
-@pytest.mark.parametrize("tyre", [Dugoff, MagicFormula])
-@pytest.mark.parametrize("front, rear", [(-700.0, -300.0), (-3000.0, -3000.0)], ids=["rolling", "locked"])
-@pytest.mark.parametrize("steer", [0.02, 0.0])
-@pytest.mark.sampled(1)
-def test_braking_to_standstill_has_no_limit_cycle(tyre, front, rear, steer):
-    names = ["velocity_x", "velocity_y", "yaw_rate", *four("wheel_speed", 0.0)]
-    run = drive(
-        tyre,
-        mu=0.8,
-        steer=steer,
-        until=6.5,
-        record=names,
-        torque=(front, front, rear, rear),
-        initial_speed=25.0,
-    )
-    speed, spins = run[0], run[3:]
-    assert speed[4500 if front == -700.0 else 2500] > 1.0
-    assert np.abs(run[:, -1]).max() < 1e-4
-    slow = speed < 8.0
-    # Wheels and car only ever slow down: nothing swings.
-    assert np.diff(spins[:, slow]).max() <= 1e-12
-    assert np.diff(speed).max() <= 1e-6
 
 
 def test_a_slow_wheel_settles_at_the_slip_of_the_whole_equation():

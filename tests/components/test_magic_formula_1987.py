@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from math import atan, atan2, cos, exp, hypot, isfinite, pi, radians, sin, tan
+from math import atan, atan2, cos, exp, hypot, pi, radians, sin, tan
 
 import pytest
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import atan2, cos, isfinite, sin
+from math import atan2, cos, sin
 
 import numpy as np
 import pytest

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
-from math import atan2, cos, isfinite, log2, pi, sin
+from math import atan2, cos, log2, pi, sin
 
 import numpy as np
 import pytest
