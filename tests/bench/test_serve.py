@@ -356,6 +356,7 @@ def test_sliders_have_units_and_the_vocabularys_ranges(server):
     assert "<option selected>controller_fnn</option>" in options and "controller_off" in options
 
 
+@pytest.mark.sampled(8)
 @pytest.mark.parametrize("name", catalogue.names("a scenario"))
 def test_every_slider_of_a_shipped_scenario_begins_where_its_run_does(planner, name):
     loaded, plan = planned(Job(name, catalogue.named(name), Path()), planner)

@@ -217,6 +217,7 @@ def held(folder):
     return FolderLock(folder / "o")
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.skipif(sys.platform == "win32", reason="folders cannot be locked")
 @pytest.mark.parametrize("command", WRITERS)
 def test_a_command_leaves_a_folder_alone_that_another_is_writing(command, yawbench, folder, held):

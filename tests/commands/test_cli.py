@@ -115,6 +115,7 @@ def test_every_command_that_sets_parameters_takes_faults() -> None:
     assert {name for name in setting if "--fault" not in options[name]} == set()
 
 
+@pytest.mark.sampled(8)
 @pytest.mark.skipif(sys.platform == "win32", reason="os.kill ends the process there")
 @pytest.mark.parametrize("name", plugins.names("command"))
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])

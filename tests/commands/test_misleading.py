@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from fractions import Fraction
 from pathlib import Path
 
 import pytest
@@ -71,16 +70,6 @@ def written(folder: Path, *, stop="10", step="1/30 s", given=', "PsiDot": 0, "ya
     return path
 
 
-@pytest.mark.parametrize(
-    ("step", "steps"),
-    [("1/30 s", 300), ("1/30", 300), ("10/300 s", 300), ("100/3 ms", 300), ("0.01", 1000)],
-)
-def test_times_may_be_fractions(folder, step, steps):
-    plan = make_plan(load_scenario(written(folder, step=step)))
-    assert (plan.step, plan.n_steps) == (Fraction(10, steps), steps)
-    assert plan.time(steps) == 10.0
-
-
 def test_times_are_shown_with_the_digits_that_tell_them_apart():
     assert [exact_text(seconds(one)) for one in ("1/30 s", 0.001, 9.99999999999, "1/3 ms")] == [
         "1/30", "0.001", "9.99999999999", "1/3000",
@@ -128,24 +117,6 @@ def test_a_mistake_in_a_scenario(folder, changed, code, names):
         make_plan(load_scenario(written(folder, **changed)))
     assert caught.value.code == code
     assert mentions(caught.value, *names)
-
-
-@pytest.mark.parametrize(
-    "car, names",
-    [
-        ({"mass": 1650000}, ("1650000 kg", "300", "5000 kg", "'1650000 g'")),
-        ({"wheelbase": 2750}, ("2750 m", "1.4", "5 m", "'2750 mm'")),
-    ],
-    ids=["grams", "mm"],
-)  # 6, 7
-def test_check_warns_of_a_grossly_wrong_car(folder, car, capsys, names):
-    plan = make_plan(load_scenario(written(folder, **car)))
-    (name,) = car
-    found = [one for one in plan.diagnostics if one.code == "value-implausible"]
-    assert [(one.severity, one.location.signal) for one in found] == [("warning", f"vehicle.{name}")]
-    assert mentions(found[0], f"vehicle.{name}", *names)
-    assert status_of("check", "a.yaml", "--fmus", "fmus") == 0
-    assert "No errors, but 1 suspicious value" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("only", ["1100", "1100 kg", "[1100]", "[1100 kg, '1200']"])  # 8

@@ -86,39 +86,6 @@ def test_a_mistake_on_the_command_line_is_answered_by_what_to_do(said, arguments
     in_one_sentence(said, arguments, names)
 
 
-@pytest.mark.parametrize(
-    ("right", "wrong", "names"),
-    [
-        ("tyre_magic_formula_1987", "~/x.fmu", ["~", "folder"]),
-        ("speed: 25.0", 'speed: "25 m per s"', ["'m per s'", "m/s", "km/h"]),
-        ("speed: 25.0", 'speed: "25,0"', ["25.0"]),
-        ("stop_time: 6.0", "stop_time: -6", ["0 s", "-6"]),
-        ("stop_time:", "stoptime:", ["'stop_time'"]),
-        ("extrapolated", "euler", ["'jacobi'", "'gauss_seidel'", "'extrapolated'", "'euler'"]),
-        ("esp_saloon", "esp_salon", ["vehicle", "esp_saloon.yaml"]),
-        ("friction:", "frction:", ["'friction'"]),
-        ("units:", "record: [plant.yawrate]\nunits:", ["'yawrate'"]),
-        (
-            "units:", "connections: [{from: plant.steer_angle, to: driver.steer_angle}]\nunits:",
-            ["plant.steer_angle"],
-        ),
-        (
-            "units:", "connections: [{form: driver.steer_angle, to: plant.steer_angle}]\nunits:",
-            ["'from'"],
-        ),
-        (
-            "units:", "connections: [{from: driver.steer_angle, to: plant.yaw_moment}]\nunits:",
-            ["driver.steer_angle", "plant.yaw_moment", "N.m"],
-        ),
-    ],
-)  # fmt: skip
-def test_a_mistake_in_a_scenario_is_answered_by_its_line_and_what_to_do(said, right, wrong, names):
-    text = Path(FILE).read_text(encoding="utf-8")
-    assert right in text
-    Path(FILE).write_text(text.replace(right, wrong, 1), encoding="utf-8")
-    in_one_sentence(said, ("check", FILE), [f"{FILE}:", *names])
-
-
 def test_the_results_of_a_run_in_place_of_its_scenario_are_told_from_a_folder_of_scenarios(said):
     assert said(*RUN, "--out", "done")[0] in (None, 0)
     in_one_sentence(said, ("check", "done"), ["done", "results", "'yawbench plot done'"])

@@ -247,30 +247,6 @@ def test_an_exception_in_a_component_is_one_sentence_with_file_and_line(yawbench
     assert error.traceback[0].rstrip().endswith("100 % größer 1")
 
 
-def test_an_exception_at_the_start_is_one_sentence(yawbench, faulty, tmp_path):
-    status, said = yawbench(faulty(value="1.0 / u[0]"), "--out", tmp_path / "out")
-    assert status == 1
-    assert said.startswith("controller: ")
-    assert mentions(said.splitlines()[0], "ZeroDivisionError", "controllers/faulty.py:20")
-    assert "Traceback" not in said
-    assert len(load_results(tmp_path / "out").time) == 0
-
-
-def test_a_wrong_value_of_a_parameter_names_the_allowed_ones(yawbench, tmp_path):
-    status, said = yawbench(car(tmp_path), "--out", tmp_path / "out", "--set", "plant.mass=-5")
-    assert status in (1, 2)
-    assert "plant" in said
-    assert "mass" in said
-    assert "-5" in said
-    assert "Traceback" not in said
-
-
-def test_friction_below_zero_is_a_mistake(yawbench, tmp_path):
-    status, said = yawbench(car(tmp_path), "--out", tmp_path / "out", "--set", "inputs.friction*=-0.65")
-    assert status == 2
-    assert mentions(said, "--set inputs.friction*=-0.65", "0", "tyre.friction_*")
-
-
 @pytest.mark.parametrize(("value", "word"), [("float('nan')", "not a number"), ("1e999", "infinite")])
 def test_a_value_that_is_not_finite_stops_the_run_and_names_its_wire(
     value, word, yawbench, faulty, fmus, tmp_path

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import pickle
 import random
 import re
 from functools import cache
@@ -334,12 +333,6 @@ def test_outputs_read_before_parameters_are_set_do_not_bind(component):
         for k in (1, 2):
             stand.step(0.001, **some_inputs(component, k))
     assert [*map(repr, stands[0].outputs().values())] == [*map(repr, stands[1].outputs().values())]
-
-
-@every
-def test_its_state_goes_through_bytes(component):
-    stand = driven(component, steps=3)
-    assert pickle.loads(frozen(stand)).keys() == stand.unit._get_fmu_state().keys()
 
 
 def test_what_units_know_of_a_car_has_the_measure_of_the_vocabulary():

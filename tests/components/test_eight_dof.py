@@ -159,16 +159,6 @@ def test_coasting_down_matches_the_closed_form_of_drag_and_rolling_resistance():
     assert speed[-1] == pytest.approx(terminal * tan(atan(30.0 / terminal) - rate * 10.0), rel=1e-4)
 
 
-@pytest.mark.parametrize("tyre", [Dugoff, MagicFormula])
-@pytest.mark.sampled(1)
-def test_rolling_resistance_stops_the_car_and_does_not_drive_it_back(tyre):
-    names = ["velocity_x", *four("wheel_speed", 0.0)]
-    speed, *spins = drive(tyre, until=4.0, record=names, initial_speed=0.2)
-    assert speed.min() >= 0.0 and speed[-1] < 1e-6
-    assert np.diff(speed).max() <= 0.0
-    assert np.max(spins) > 0.5 and np.min(spins) == 0.0 == np.max(np.array(spins)[:, -1000:])
-
-
 def test_torque_against_the_rolling_resistance_keeps_the_car_rolling_without_slip():
     front, rear = (P.rolling_resistance * 0.313 * 0.5 * P.mass * G * arm / 2.6 for arm in (1.56, 1.04))
     names = ["velocity_x", *four("slip_ratio", 0.0)]
@@ -268,31 +258,6 @@ def test_braking_agrees_with_an_independent_solution():
     measured("cars", car, SCIPY, error.max(), at_most=3e-4)  # the torque steps at the start
 
 
-def test_left_and_right_are_mirrored_to_the_last_bit():
-    names = ["velocity_x", "yaw_rate", "roll_angle", "position_y", "vertical_load_fl", "wheel_speed_rl"]
-    mirrored = ["velocity_x", "yaw_rate", "roll_angle", "position_y", "vertical_load_fr", "wheel_speed_rr"]
-    setting = {"mu": 0.9, "until": 1.5, "torque": (-200.0,), "initial_speed": 25.0}
-    left = drive(Dugoff, steer=0.08, record=names, **setting)
-    right = drive(Dugoff, steer=-0.08, record=mirrored, **setting)
-    difference = np.abs(left - right * np.array([[1.0], [-1.0], [-1.0], [-1.0], [1.0], [1.0]])).max()
-    measured("mirror", "plant_eight_dof", "its mirror image", difference, at_most=0.0)
-    assert np.ptp(left[1]) > 0.4
-
-
-def test_a_step_with_held_inputs_may_be_split():
-    held = {"steer_angle": 0.05, **lateral(3000.0), **four("tyre_force_x", 100.0, -300.0, 200.0, -100.0)}
-    torque = four("wheel_torque", -20.0, -60.0, 50.0, -30.0)
-    ends = []
-    for parts in (1, 5):
-        stand = Stand(EightDof, initial_speed=25.0, slip_stiffness_per_load=0.0)
-        stand.start(**held, **torque)
-        for _ in range(100 * parts):
-            y = stand.step(0.005 / parts)
-        ends.append(y)
-    for name, value in ends[0].items():
-        assert value == pytest.approx(ends[1][name], rel=1e-6, abs=1e-6), name
-
-
 def test_lifted_wheels_carry_nothing_and_the_others_carry_the_car():
     stand = Stand(EightDof, initial_speed=20.0, cg_height=0.9, roll_centre_height_front=0.5)
     y = stand.start(**lateral(14000.0))
@@ -355,37 +320,6 @@ def test_driving_torque_turns_a_backward_rolling_wheel_forward():
     for _ in range(100):
         y = stand.step(1e-3, **four("wheel_torque", 400.0))
     assert y["wheel_speed_rl"] > 5.0
-
-
-@pytest.mark.parametrize("torque", [0.0, -1000.0])
-def test_a_car_at_rest_stays_at_rest(torque):
-    names = ["velocity_x", "velocity_y", "yaw_rate", "roll_angle", "wheel_speed_fl", "position_x"]
-    run = drive(MagicFormula, until=0.5, record=names, torque=(torque,), initial_speed=0.0)
-    assert not run.any()
-
-
-@pytest.mark.parametrize("tyre", [Dugoff, MagicFormula])
-@pytest.mark.parametrize("front, rear", [(-700.0, -300.0), (-3000.0, -3000.0)], ids=["rolling", "locked"])
-@pytest.mark.parametrize("steer", [0.02, 0.0])
-@pytest.mark.sampled(1)
-def test_braking_to_standstill_has_no_limit_cycle(tyre, front, rear, steer):
-    names = ["velocity_x", "velocity_y", "yaw_rate", *four("wheel_speed", 0.0)]
-    run = drive(
-        tyre,
-        mu=0.8,
-        steer=steer,
-        until=6.5,
-        record=names,
-        torque=(front, front, rear, rear),
-        initial_speed=25.0,
-    )
-    speed, spins = run[0], run[3:]
-    assert speed[4500 if front == -700.0 else 2500] > 1.0
-    assert np.abs(run[:, -1]).max() < 1e-4
-    slow = speed < 8.0
-    # Wheels and car only ever slow down: nothing swings.
-    assert np.diff(spins[:, slow]).max() <= 1e-12
-    assert np.diff(speed).max() <= 1e-6
 
 
 def test_a_slow_wheel_settles_at_the_slip_of_the_whole_equation():

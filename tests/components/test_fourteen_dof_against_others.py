@@ -156,15 +156,3 @@ def test_braking_in_the_turn_is_within_two_thousandths_of_an_independent_solutio
     assert exact[NAMES.index("velocity_x"), -1] < 21.0
     car = "plant_fourteen_dof, tyre_magic_formula, braking in a turn"
     measured("cars", car, LAGRANGE, errors.max(), at_most=2e-3)
-
-
-def test_the_mirrored_manoeuvre_gives_the_mirrored_motion():
-    names = ["velocity_x", "heave", "pitch_angle", "vertical_load_fl", "wheel_speed_rl"]
-    odd = ["yaw_rate", "roll_angle", "position_y", "velocity_y", "acceleration_y"]
-    mirrored = [*names[:3], "vertical_load_fr", "wheel_speed_rr", *odd]
-    setting = {"mu": 0.9, "until": 1.5, "torque": (-200.0,), "initial_heave": 0.02}
-    left = drive(Dugoff, steer=0.08, record=[*names, *odd], **setting)
-    right = drive(Dugoff, steer=-0.08, record=mirrored, **setting)
-    right[len(names) :] *= -1.0
-    measured("mirror", "plant_fourteen_dof", "its mirror image", np.abs(left - right).max(), at_most=0.0)
-    assert np.ptp(left[5]) > 0.3

@@ -48,12 +48,6 @@ def linear_tyre(alpha, kappa):
     return LinearTyre.wheel(kappa, alpha, 1.0, 1.0, LinearTyre.axle(LinearTyreParameters(), "front"))[:2]
 
 
-def test_mirrored_slip_gives_the_mirrored_force_to_the_last_bit():
-    for alpha in (0.1, 1.7, 3.0):
-        f_x, f_y = linear_tyre(alpha, 0.1)
-        assert linear_tyre(-alpha, 0.1) == (f_x, -f_y)
-
-
 def test_backwards_rolling_is_opposed_on_the_same_side_as_forwards():
     forwards = linear_tyre(0.2, 0.0)
     assert linear_tyre(pi - 0.2, 0.0) == pytest.approx(forwards)

@@ -125,21 +125,6 @@ def test_another_channels_figures_change_nothing():
     assert [stand.step(0.001)["yaw_rate"] for _ in range(200)] == alone
 
 
-def test_a_restored_state_goes_on_with_the_same_noise():
-    stand = Stand(Production)
-    stand.start(yaw_rate_true=0.1)
-    for _ in range(37):
-        stand.step(0.001, yaw_rate_true=0.1)
-    kept, time = stand.unit._fmu_state_to_bytes(stand.unit._get_fmu_state()), stand.time
-    once = [stand.step(0.001, yaw_rate_true=0.2) for _ in range(50)]
-    other = Stand(Production, seed=5)
-    other.start()
-    other.unit._set_fmu_state(other.unit._fmu_state_from_bytes(kept))
-    other.time = time
-    assert [other.step(0.001, yaw_rate_true=0.2) for _ in range(50)] == once
-    assert len({y["yaw_rate"] for y in once}) > 3
-
-
 def test_accelerometers_feel_gravity_when_the_body_leans():
     lean = {"roll_angle_true": 0.06, "pitch_angle_true": -0.04}
     true = {"acceleration_x_true": 2.0, "acceleration_y_true": 3.0}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import atan2, cos, isfinite, sin
+from math import atan2, cos, sin
 
 import numpy as np
 import pytest
@@ -40,7 +40,6 @@ def pushed(f_x=(0, 0, 0, 0), f_y=(0, 0, 0, 0), torque=(0, 0, 0, 0), delta=0.0):
 
 
 HARD = pushed((300, -200, 150, -90), (-2000, -3000, -1500, -2500), (80, -60, 40, -20), 0.04)
-MIRRORED = pushed((-200, 300, -90, 150), (3000, 2000, 2500, 1500), (-60, 80, -20, 40), -0.04)
 
 
 def kinetic_energy(y, p=P):
@@ -266,36 +265,6 @@ def test_accelerations_that_grow_linearly_are_carried_to_the_end_of_any_step_exa
         assert y["acceleration_y"] == pytest.approx(4 * (100.0 + 5000.0 * t) / P.mass, rel=1e-12)
 
 
-# ---- symmetry, steps, state
-
-
-def test_the_mirrored_car_does_the_mirrored_to_the_last_bit():
-    left = car(initial_speed=25.0, initial_sideslip=-0.05, initial_yaw_rate=0.3)
-    right = car(initial_speed=25.0, initial_sideslip=0.05, initial_yaw_rate=-0.3)
-    y_l, y_r = left.start(**HARD), right.start(**MIRRORED)
-    odd = {"velocity_y", "yaw_rate", "sideslip", "sideslip_rate", "acceleration_y", "position_y", "yaw_angle"}
-    swap = {"fl": "fr", "fr": "fl", "rl": "rr", "rr": "rl"}
-    for k in range(300):
-        for name, value in y_l.items():
-            stem, _, wheel = name.rpartition("_")
-            other = f"{stem}_{swap[wheel]}" if wheel in swap else name
-            sign = -1.0 if name in odd or stem == "slip_angle" else 1.0
-            assert y_r[other] == sign * value, (k, name)
-        y_l, y_r = left.step(0.002, **HARD), right.step(0.002, **MIRRORED)
-    assert abs(y_l["yaw_rate"]) > 0.3
-
-
-def test_under_held_forces_the_result_does_not_depend_on_how_the_step_is_split():
-    whole, split = car(initial_speed=25.0), car(initial_speed=25.0)
-    whole.start(**HARD)
-    split.start(**HARD)
-    one = whole.step(0.004, **HARD)
-    for h in (0.0005, 0.001, 0.002, 0.0005):
-        many = split.step(h, **HARD)
-    for name, value in one.items():
-        assert many[name] == pytest.approx(value, rel=1e-9, abs=1e-9), name
-
-
 def test_steering_during_the_step_is_right_to_at_least_the_third_power_of_the_step():
     def error(h):
         one, many = car(initial_speed=25.0), car(initial_speed=25.0)
@@ -310,20 +279,6 @@ def test_steering_during_the_step_is_right_to_at_least_the_third_power_of_the_st
     for coarse, fine in zip(error(0.01), error(0.005), strict=True):
         assert fine < 2e-6
         assert coarse / fine > 7.0
-
-
-# ---- walking pace and rest
-
-
-def test_nothing_is_ever_infinite_or_undefined_whatever_the_forces():
-    random = np.random.default_rng(7)
-    for speed in (0.0, 1e-9, 0.1, -3.0, 60.0):
-        stand = car(initial_speed=speed)
-        stand.start()
-        for _ in range(200):
-            f = random.uniform(-1, 1, (3, 4)) * 10.0 ** random.uniform(-6, 4)
-            y = stand.step(0.001, **pushed(*f, delta=random.uniform(-1.5, 1.5)))
-            assert all(map(isfinite, y.values()))
 
 
 def test_a_step_of_no_length_moves_nothing():

@@ -89,16 +89,6 @@ def test_opposite_halves_of_a_steered_car_neither_drive_nor_brake():
     assert sum(forces(stand, yaw_moment=3000.0, steer_angle=0.2)) == pytest.approx(0.0, abs=1e-9)
 
 
-@pytest.mark.parametrize("reading", SIDE_FORCES)
-def test_left_and_right_are_mirrored_to_the_last_bit(reading):
-    left = Stand(SideShare, side_forces=reading, front_share_left=0.3, front_share_right=0.7)
-    right = Stand(SideShare, side_forces=reading, front_share_left=0.7, front_share_right=0.3)
-    left.start()
-    right.start()
-    fl, fr, rl, rr = forces(left, yaw_moment=1234.5, steer_angle=0.07, drive_force=321.0)
-    assert [fr, fl, rr, rl] == forces(right, yaw_moment=-1234.5, steer_angle=-0.07, drive_force=321.0)
-
-
 def test_the_drivers_force_comes_on_top_equal_left_and_right():
     stand = Stand(SideShare, drive_front_share=0.25)
     stand.start()

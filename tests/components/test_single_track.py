@@ -160,31 +160,6 @@ def test_the_rate_of_a_sine_is_its_derivative():
 
 
 @pytest.mark.parametrize("mode", ["steady_state", "dynamic"])
-def test_left_and_right_are_mirrored_to_the_last_bit(mode):
-    left, right = Stand(SingleTrack, mode=mode), Stand(SingleTrack, mode=mode)
-    left.start(velocity_x=22.0, friction=0.4)
-    right.start(velocity_x=22.0, friction=0.4)
-    for k in range(500):
-        delta = 0.09 * sin(0.01 * k)
-        one = left.step(0.005, steer_angle=delta, velocity_x=22.0, friction=0.4)
-        two = right.step(0.005, steer_angle=-delta, velocity_x=22.0, friction=0.4)
-        assert all(one[name] == -two[name] for name in one)
-
-
-def test_a_step_on_straight_inputs_may_be_split():
-    ends = []
-    for parts in (1, 8):
-        stand = Stand(SingleTrack, mode="dynamic")
-        stand.start(velocity_x=25.0, friction=0.5)
-        for k in range(20 * parts):
-            part = (k + 1) / (20 * parts)
-            y = stand.step(0.01 / parts, steer_angle=0.05 * part, velocity_x=25.0 - 3.0 * part, friction=0.5)
-        ends.append(y)
-    for name in ("yaw_rate_ref", "sideslip_ref"):
-        assert ends[0][name] == pytest.approx(ends[1][name], rel=1e-5)
-
-
-@pytest.mark.parametrize("mode", ["steady_state", "dynamic"])
 @pytest.mark.parametrize("limited", [False, True])
 def test_a_car_at_rest_or_rolling_backwards_is_asked_for_no_yaw_rate(mode, limited):
     stand = Stand(SingleTrack, mode=mode, limit_steer_angle=limited)

@@ -33,10 +33,6 @@ def defaults():
     ]
 
 
-def test_every_value_belongs_to_a_parameter_of_a_unit(car):
-    assert set(car) <= {name for _, name, _ in defaults()}
-
-
 def test_a_unit_without_a_vehicle_file_is_the_papers_car(car):
     for unit, name, default in defaults():
         two_tyres = default == 0.0 and name.startswith("cornering_stiffness_")

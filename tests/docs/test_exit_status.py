@@ -50,6 +50,7 @@ def folder(tmp_path, monkeypatch, fmus):
     return tmp_path
 
 
+@pytest.mark.sampled(8)
 @pytest.mark.parametrize(
     ("before", "command", "status", "words"),
     [

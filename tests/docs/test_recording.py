@@ -36,6 +36,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return place / "ferrari"
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize(
     "name", ["fit_dugoff", pytest.param("fit_magic_formula", marks=pytest.mark.exhaustive)]
 )

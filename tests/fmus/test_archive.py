@@ -155,6 +155,7 @@ def test_an_archive_holds_what_the_fmu_needs_and_nothing_else(archive):
     assert not {"mathematics/fuzzy.py", "pythonfmu/builder.py", "pythonfmu/deploy.py"} & inside
 
 
+@pytest.mark.exhaustive
 def test_the_same_sources_give_the_same_bytes_from_another_folder(checkout, tmp_path):
     build_all(tmp_path / "here", components=SOME)
     build_all(tmp_path / "there", root=checkout)

@@ -363,14 +363,13 @@ def test_a_folder_that_cannot_be_written_is_one_sentence(tmp_path, monkeypatch):
     assert each_mentions(texts_of(caught.value), ("tyre_linear", "[Errno 13]"))
 
 
-DIES = """
-import os, signal, sys, time
+LEFT_ALONE = """
+import os, time
 from yawbench.fmus import check
-check.defects(sys.argv[1])
-print(check._checker.child.pid, flush=True)
-if os.fork() == 0:
-    time.sleep(60)  # with the pipe to the checker
-os.kill(os.getpid(), signal.SIGKILL)
+check.defects({fmu!r})
+if os.fork():
+    print(check._checker.child.pid, flush=True)
+time.sleep(60)  # the copy, too, with the pipe to the checker
 """
 
 
@@ -378,7 +377,7 @@ os.kill(os.getpid(), signal.SIGKILL)
 def test_the_process_that_looks_at_fmus_ends_with_a_build_that_was_killed(tmp_path):
     make_fmu(tmp_path / "a.fmu")
     with subprocess.Popen(
-        [sys.executable, "-c", DIES, str(tmp_path / "a.fmu")],
+        [sys.executable, "-c", LEFT_ALONE.format(fmu=str(tmp_path / "a.fmu"))],
         stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, start_new_session=True,
     ) as build:  # fmt: skip
         assert build.stdout is not None
@@ -386,6 +385,7 @@ def test_the_process_that_looks_at_fmus_ends_with_a_build_that_was_killed(tmp_pa
         try:
             ended = select.poll()
             ended.register(os.pidfd_open(checker), select.POLLIN)
+            build.kill()
             assert ended.poll(30_000)
         finally:
             os.killpg(build.pid, signal.SIGKILL)

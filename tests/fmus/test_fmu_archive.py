@@ -155,15 +155,6 @@ def test_entries_unused_for_long_are_deleted(fmu: Path, cache: Path, tmp_path: P
     assert sorted(cache.iterdir()) == sorted([new, foreign])
 
 
-def test_an_archive_in_a_path_with_spaces_and_umlauts_is_opened(fmu: Path, tmp_path: Path) -> None:
-    path = tmp_path / "Prüfstand für Räder" / "tyre ä.fmu"
-    path.parent.mkdir()
-    fmu.rename(path)
-    opened = open_fmu(path)
-    assert opened.path == path
-    assert str(opened.directory).isascii()
-
-
 @pytest.mark.parametrize("name", ["Größe", "50 %", "a#b", "käse"])
 def test_a_cache_whose_path_is_not_plain_ascii_is_passed_over(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -32,6 +32,7 @@ def test_a_scenario_that_comes_along_is_run_by_its_name_from_any_folder(yawbench
     assert (tmp_path / f"results/{NAME},stop_time=0.01/run.json").is_file()
 
 
+@pytest.mark.exhaustive
 def test_every_command_that_takes_a_scenario_takes_a_name(yawbench):
     status, text, _ = yawbench("check", NAME)
     assert status == 0
@@ -111,6 +112,7 @@ def test_the_glance_at_a_file_sees_the_kind_that_its_schema_sees():
 KINDS = ("a scenario", "a study file", "a sweep file", "a tuning file", "a vehicle file")
 
 
+@pytest.mark.sampled(1)
 @pytest.mark.parametrize(
     ("words", "completed"),
     [

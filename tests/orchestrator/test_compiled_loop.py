@@ -87,7 +87,7 @@ def both(tmp_path, monkeypatch, capsys):
     return run
 
 
-@pytest.mark.sampled(3)
+@pytest.mark.sampled(1)
 @pytest.mark.parametrize("interpolation", ["linear", "held"])
 @pytest.mark.parametrize("algorithm", ["jacobi", "gauss_seidel", "extrapolated"])
 def test_periods_series_and_converting_wires_give_the_same_bytes(
@@ -103,14 +103,14 @@ def test_periods_series_and_converting_wires_give_the_same_bytes(
     assert record["rows"] == 601
 
 
-@pytest.mark.sampled(2)
+@pytest.mark.sampled(1)
 @pytest.mark.parametrize("name", names("a scenario"))
 def test_a_published_scenario_gives_the_same_bytes(both, fmus, name):
     status, said, record = both(name, "--fmus", fmus, "--set", "stop_time=2")
     assert (status, record["status"]) == (0, "completed"), said
 
 
-@pytest.mark.sampled(3)
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize(
     "fault",
     [
@@ -211,6 +211,7 @@ def test_a_status_ends_the_run_with_the_same_sentence(both, library, tmp_path, a
     assert mentions(said, *names)
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize(
     ("act", "value", "status", "names"),
     [

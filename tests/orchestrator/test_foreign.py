@@ -320,6 +320,7 @@ def test_one_unit_may_be_left_unvalidated_by_the_scenario(run):
     assert "units.b" not in said
 
 
+@pytest.mark.exhaustive
 def test_every_command_that_runs_a_scenario_takes_fmus_that_are_formally_wrong_if_asked_to(
     run, tmp_path, monkeypatch
 ):
@@ -388,7 +389,7 @@ HANGING = (
 
 @together_and_apart
 @pytest.mark.parametrize("function", HANGING)
-@pytest.mark.sampled(6)
+@pytest.mark.sampled(2)
 def test_an_fmu_that_hangs_in_initialization_is_ended_at_the_limit_of_a_call(
     run, monkeypatch, function, isolate
 ):

@@ -138,12 +138,6 @@ def test_earlier_results_stay_until_the_new_ones_are_whole(tmp_path):
     assert sorted(p.name for p in tmp_path.iterdir()) == ["results.csv", "run.json"]
 
 
-def test_results_may_go_to_a_path_with_spaces_and_umlauts_that_does_not_exist_yet(tmp_path):
-    folder = tmp_path / "Läufe von heute" / "Nr. 1"
-    record(folder, table(2))
-    assert len(load_results(folder).time) == 2
-
-
 def test_a_folder_that_cannot_be_made_is_one_sentence(tmp_path):
     (tmp_path / "file").write_text("")
     with refused(ResultsError, "results-unwritable", names=("out", "results", "directory")):
@@ -154,21 +148,6 @@ def test_a_file_in_place_of_the_folder_is_one_sentence(tmp_path):
     (tmp_path / "out").write_text("")
     with refused(ResultsError, "results-unwritable", names=("--out", "folder")):
         Recorder(tmp_path / "out", ["a.x"], [True])
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="folders cannot be locked")
-def test_a_second_run_into_the_same_folder_is_refused_until_the_first_has_ended(tmp_path):
-    first = Recorder(tmp_path, ["a.x"], [True])
-    with pytest.raises(ResultsError) as caught:
-        Recorder(tmp_path, ["a.x"], [True])
-    assert caught.value.code == "results-locked"
-    first.rows[0][:] = 0.0, 1.0
-    first.write(1)
-    first.finish(RunRecord(status="completed", units={}))
-    first.close()
-    assert load_results(tmp_path)["a.x"].tolist() == [1.0]
-    for _ in range(2):
-        Recorder(tmp_path, ["a.x"], [True]).discard()
 
 
 def test_a_path_that_is_no_utf_8_does_not_cost_the_results(tmp_path):

@@ -282,13 +282,6 @@ def test_a_folder_and_a_binary_file_are_no_scenarios(file: Path) -> None:
     assert each_mentions(problems(Path("e.yaml")), ("e.yaml",))
 
 
-def test_a_path_with_spaces_and_umlauts_is_read(file: Path) -> None:
-    path = Path("Läufe 2/mit Wörtern.yaml")
-    path.parent.mkdir()
-    path.write_text(GOOD.replace("Single sine", "Einfacher Sinus, µ 0,65"), encoding="utf-8")
-    assert load_scenario(path).title == "Einfacher Sinus, µ 0,65"
-
-
 def test_vehicle_parameters_come_from_beside_the_scenario(file: Path) -> None:
     Path("cars").mkdir()
     Path("cars/car.yaml").write_text("title: Car\nparameters: {mass: 1.1 t}\n")

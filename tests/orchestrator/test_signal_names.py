@@ -8,19 +8,15 @@ import re
 import zipfile
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from tests.changed import changed
 from tests.command_line import status_of
-from yawbench.figures.display import LabelledRun
-from yawbench.figures.panels import panels_of
 from yawbench.metrics.expressions import evaluate, metric
 from yawbench.orchestrator.results.reader import load_results
 from yawbench.orchestrator.scenario.loader import load_scenario
 from yawbench.orchestrator.signal_names import SignalName, Target, match, matching
 from yawbench.orchestrator.wiring.make_plan import make_plan
-from yawbench.reports.divergence import divergence
 from yawbench.studies.experiment import plan_experiment
 from yawbench.studies.load_experiment import load_experiment
 from yawbench.studies.open_value_regions import RegionRuns
@@ -202,46 +198,6 @@ def test_constants_of_inputs_are_set_by_name_and_by_instance(folder, yawbench):
     )
     plan = planned("other.yaml", changed(settings=["inputs.plant.u[1]=0.1"]))
     assert plant_of(plan).constants["u[1]"] == 0.1
-
-
-def test_figures_draw_them_alone_and_over_one_another(folder, yawbench):
-    yawbench("run", "other.yaml", "--out", "out")
-    panels = ("plant.x[1]", "frame[1].y", "plant.body.w(plant.x[1])")
-    status, _, said = yawbench("plot", "out", *(word for one in panels for word in ("--panel", one)))
-    assert status == 0, said
-    results = LabelledRun("", load_results(folder / "out"))
-    assert [len(panels_of([results], one)) for one in panels] == [1, 1, 1]
-    assert (folder / "out/overview.svg").is_file()
-
-
-def test_runs_that_differ_in_them_are_told_apart(folder, yawbench):
-    yawbench("run", "other.yaml", "--out", "one")
-    yawbench("run", "other.yaml", "--set", "driver.a[1]=3 deg", "--out", "other")
-    status, out, said = yawbench("diff", "one", "other")
-    assert status == 0, said
-    assert {"driver.a[1]", "plant.x[1]", "plant.body.w", "plant.frame[1].y"} <= set(out.split())
-    parted = divergence(load_results(folder / "one"), load_results(folder / "other"))
-    assert {one.signal: one.targets for one in parted.partings}["driver.steer_angle"] == ("plant",)
-
-
-def test_convergence_is_measured_of_them(folder, yawbench):
-    options = ("--halvings", 2, "--out", "out")
-    status, _, said = yawbench("converge", "other.yaml", "--signal", "plant.body.w", *options)
-    assert status == 0, said
-    status, _, said = yawbench("converge", "other.yaml", "--signal", "body", *options)
-    assert status == 2, said
-
-
-def test_faults_disturb_them(folder, yawbench):
-    bias = ("--fault", "plant.frame[1].y: bias 2 from 1 s", "--fault", "plant.body.*: gain 0")
-    status, _, said = yawbench("run", "other.yaml", "--out", "out", *bias)
-    assert status == 0, said
-    results = load_results(folder / "out")
-    assert not results["plant.body.w"].any()
-    at = np.searchsorted(results.time, 1.0)
-    jump = results["plant.frame[1].y"][at] - results["plant.frame[1].y"][at - 1]
-    assert jump == pytest.approx(2, abs=0.1)
-    assert [one.on for one in results.record.faults] == ["plant.frame[1].y", "plant.body.*"]
 
 
 STUDY = """\

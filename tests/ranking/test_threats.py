@@ -313,6 +313,7 @@ def rows(file):
     return list(csv.DictReader(file.open(encoding="utf-8")))
 
 
+@pytest.mark.exhaustive
 def test_two_runs_from_nothing_give_the_same_tables(tmp_path, capsys, monkeypatch):
     """Each with an empty cache and its own number of processes."""
     (tmp_path / "ranking.yaml").write_text(RANKING)

@@ -44,10 +44,6 @@ def whole(study):
     return judge_all(FOLDER / "study.yaml", study["folder"], "--quick")
 
 
-def test_every_file_of_the_folder_is_tested_here():
-    assert {path.stem for path in FOLDER.glob("*.yaml")} == {*SCENARIOS, "study", "tuning"}
-
-
 @pytest.mark.parametrize("name", SCENARIOS)
 def test_every_scenario_is_valid_and_runs(fmus, study, name):
     assert not status_of("check", FOLDER / f"{name}.yaml", "--fmus", fmus)
@@ -191,24 +187,6 @@ def test_the_coupling_error_of_the_sine_at_1_ms_is_small(fmus, tmp_path, control
     coarse, fine = (load_results(job.out)["plant.yaw_rate"] for job in jobs)
     error = np.max(np.abs(coarse - fine[::4])) * 4 / 3  # the fine run's own, of first order, counted in
     assert 0.0 < error / np.max(np.abs(fine)) <= most
-
-
-@pytest.mark.parametrize(
-    ("run", "setting"), [("sine", "driver.amplitude=-1.5"), ("double_lane_change", "driver.lane_offset=-3.5")]
-)
-@pytest.mark.exhaustive
-def test_the_mirrored_manoeuvre_gives_the_mirrored_motion(study, fmus, tmp_path, run, setting):
-    out = tmp_path / run
-    (outcome,) = execute([Job(run, FOLDER / f"{run}.yaml", out, changed(settings=[setting]), fmus)])
-    assert outcome.ok
-    there, mirrored = load_results(study["folder"] / run / "fuzzy_pid"), load_results(out)
-    for name in ("yaw_rate", "sideslip", "roll_angle", "position_y"):
-        left, right = there[f"plant.{name}"], mirrored[f"plant.{name}"]
-        assert np.max(np.abs(left + right)) <= 1e-9 * np.max(np.abs(left))
-    for axle in "fr":
-        left, right = (f"wheel_control.brake_pressure_{axle}{side}" for side in "lr")
-        assert there[left].max() > 0.0
-        assert np.max(np.abs(there[left] - mirrored[right])) <= 1e-9 * there[left].max()
 
 
 @pytest.mark.exhaustive

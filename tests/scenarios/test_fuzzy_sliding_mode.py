@@ -51,11 +51,6 @@ def whole(study):
     return judge_all(FOLDER / "study.yaml", study["folder"], "--quick")
 
 
-def test_every_file_of_the_folder_is_tested_here():
-    elsewhere = {"monitored"}  # tests/scenarios/test_monitored.py
-    assert {path.stem for path in FOLDER.glob("*.yaml")} == {*SCENARIOS, *STUDIES, *elsewhere}
-
-
 STUDIED = (*ROADS, "beyond_grip")
 """Their first second is of the study, too."""
 

@@ -143,6 +143,7 @@ def installed(tmp_path_factory) -> Path:
     return site
 
 
+@pytest.mark.exhaustive
 def test_outside_a_checkout_dry_runs_work_and_runs_take_the_fmus_of_the_cache(installed, tmp_path):
     work = tmp_path / "work"
     work.mkdir()

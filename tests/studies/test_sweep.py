@@ -207,28 +207,6 @@ def test_a_run_that_fails_is_a_row_with_its_reason_and_is_not_made_again(moods, 
     assert (tmp_path / "out" / "table.parquet").read_bytes() == table
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="needs a limit on the size of files")
-def test_runs_that_met_a_full_disk_are_made_again(moods, yawbench, tmp_path):
-    import resource
-
-    file = moods(10, 20)
-    file.write_text(file.read_text() + "keep: all\nstop_time: 10\n")
-    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, limits[1]))
-    try:
-        assert yawbench(file, "out")[0] in (1, 2)
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
-    yawbench(file, "out")
-    found = rows(tmp_path / "out")
-    assert [row["status"] for row in found] == ["completed"] * 2 + ["failed"] * 2
-    assert "twenty is too much" in found[2]["reason"]
-    completed = [load_results(path.parent) for path in (tmp_path / "out").rglob("results.csv")]
-    assert sorted(len(results.time) for results in completed) == [6, 6, 1001, 1001]
-    assert len(journal(tmp_path / "out")) == 4
-    assert "4 runs, all finished already" in yawbench(file, "out")[2]
-
-
 @pytest.mark.parametrize(
     ("code", "again"),
     [
@@ -277,15 +255,6 @@ def test_isolated_runs_that_hang_or_crash_are_rows_that_name_the_unit(moods, yaw
     assert mentions(hung["reason"], "3 s", "return")
     yawbench(moods(10), "together")
     assert calm == rows(tmp_path / "together")
-
-
-@pytest.mark.parametrize("level", [40, 50])
-@pytest.mark.exhaustive
-def test_a_run_whose_process_is_killed_is_made_again(level, moods, yawbench, tmp_path):
-    status, _, err = yawbench(moods(10, level, count=2), "out", "--jobs", "1")
-    assert status == 0, err
-    assert (tmp_path / str(level)).exists()  # it was killed
-    assert [row["moment"] for row in rows(tmp_path / "out")] == pytest.approx([1, 1, level / 10, level / 10])
 
 
 def test_more_levels_add_runs_and_repeat_none(moods, yawbench, tmp_path):

@@ -21,7 +21,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Folder]:
 
 
 @pytest.mark.parametrize("group", GROUPS)
-@pytest.mark.sampled(2)
+@pytest.mark.sampled(1)
 def test_altered_values_are_computed_with_or_answered_in_a_sentence(group: str, folder: Folder) -> None:
     counts, notes = trial(group, [0, 1, 2], 1, folder, 1)
     assert notes == []

@@ -53,6 +53,7 @@ def broken(text: str, what: str) -> str:
     return head + "static int output(" + rest.replace(before, after, 1)
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize("what", BROKEN)
 def test_a_translation_that_is_wrong_is_found_out(what, tmp_path):
     with component_of(source(LAW), tmp_path) as (component, home):
@@ -105,6 +106,7 @@ def compare(tmp_path_factory):
         yield compare
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize("law", HUGE)
 def test_an_integer_of_2_to_53_is_an_error_and_no_wrong_number(law, compare):
     assert INEXACT in compare(law, differences).difference
@@ -140,6 +142,7 @@ def test_what_a_start_leaves_to_the_next_start_is_found_out(law, compare):
     assert "outputs read before" in found
 
 
+@pytest.mark.sampled(1)
 @pytest.mark.parametrize("slow", ["by its length", "by its comparison"])
 def test_a_run_waits_neither_for_a_long_translation_nor_for_a_long_comparison(slow, tmp_path, monkeypatch):
     monkeypatch.setenv("YAWBENCH_CACHE", str(tmp_path / "cache"))
