@@ -308,8 +308,8 @@ def sentences(found: Mapping[str, Numbers]) -> list[tuple[Path, str, str]]:
         for paper, (names, _) in PAPERS.items()
     }
     told = (
-        "{} claims of four papers, {} hold whatever the papers leave open, {} do not reproduce, {} depend on "
-        "what is left open, {} are undecided"
+        "{} claims of four papers, {} hold and {} do not reproduce over more than nine tenths of what the papers "
+        "leave open, {} depend on it, {} are undecided"
     ).format(*every)
     lines = [
         _row(("paper", "controlled variable and method", "claims", *KINDS)),
@@ -320,8 +320,8 @@ def sentences(found: Mapping[str, Numbers]) -> list[tuple[Path, str, str]]:
         ),
     ]
     words = (
-        "of {} claims {} hold whatever the paper leaves open, {} do not reproduce, {} depend on what it "
-        "leaves open, {} are undecided"
+        "of {} claims {} hold and {} do not reproduce over more than nine tenths of what the paper leaves open, "
+        "{} depend on it, {} are undecided"
     )
     return [
         (
