@@ -252,8 +252,8 @@ def pages_with_numbers() -> dict[Path, str]:
         "lifts": G * PaperA.track_width / (2.0 * PaperA.cg_height),
     }  # fmt: skip
     pages = {
-        DOCS / file.name: reflowed(environment.get_template(file.name).render())
-        for file in sorted(TEMPLATES.glob("*.md"))
+        DOCS / file.stem: reflowed(environment.get_template(file.name).render())
+        for file in sorted(TEMPLATES.glob("*.md.jinja"))
     }
     for page, name, text in sentences(found):
         pages[page] = replaced(
@@ -308,8 +308,8 @@ def sentences(found: Mapping[str, Numbers]) -> list[tuple[Path, str, str]]:
         for paper, (names, _) in PAPERS.items()
     }
     told = (
-        "{} claims of four papers, {} hold and {} do not reproduce over more than nine tenths of what the papers "
-        "leave open, {} depend on it, {} are undecided"
+        "{} claims of four papers, {} hold and {} do not reproduce over more than nine tenths of what the "
+        "papers leave open, {} depend on it, {} are undecided"
     ).format(*every)
     lines = [
         _row(("paper", "controlled variable and method", "claims", *KINDS)),
@@ -320,8 +320,8 @@ def sentences(found: Mapping[str, Numbers]) -> list[tuple[Path, str, str]]:
         ),
     ]
     words = (
-        "of {} claims {} hold and {} do not reproduce over more than nine tenths of what the paper leaves open, "
-        "{} depend on it, {} are undecided"
+        "of {} claims {} hold and {} do not reproduce over more than nine tenths of what the paper leaves "
+        "open, {} depend on it, {} are undecided"
     )
     return [
         (
