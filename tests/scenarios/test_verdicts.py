@@ -77,6 +77,14 @@ def test_what_the_words_of_the_pages_rest_on_is_so(known):
         assert 0.8 * network < fuzzy < network
 
 
+def test_with_motors_that_lag_the_network_has_the_best_gains_of_all_and_the_widest_luck():
+    laws = papers.found_by_seeds()["tuning_with_actuators"]
+    network = laws.pop("fuzzy neural network")
+    assert len(network) == 5
+    assert min(network) < min(map(min, laws.values()))
+    assert max(network) > max(map(max, laws.values()))
+
+
 LESS, MORE = 0.99, 1.01
 """Factors on another run's number: a difference of less than 1 % counts as none (docs/regions.md)."""
 
