@@ -91,7 +91,8 @@ def fit_sentences() -> str:
     return (
         f"On the {number} held-out windows the rms differences of the car with Dugoff's tyres are "
         f"{listed(told, last='and')} of those of the single track (95 %, jackknife over the pairs of "
-        f"windows, which holds the truth in 92 to 95 % of simulations). Corrected for three comparisons it is clearly better in {clear or 'none of them'}. "
+        f"windows, which holds the truth in 92 to 95 % of simulations). Corrected for "
+        f"three comparisons it is clearly better in {clear or 'none of them'}. "
         "The windows are of one lap: they tell of its bends, and of no other track."
     )
 
@@ -112,7 +113,8 @@ def estimators_table() -> Table:
         ])  # fmt: skip
     note = (
         f"Lap: mean of the rms of {len(of_laps(found[ZERO]))} laps, with Student's 95 % interval, for "
-        "further laps of this car on this track (93 to 95 % in simulations). Errors follow the bends, which every lap repeats, so they "
+        "further laps of this car on this track (93 to 95 % in simulations). Errors follow the "
+        "bends, which every lap repeats, so they "
         "tell nothing of another track."
     )
     headings = ["", "rms, 550 s", "rms of a lap", "over that of constant zero, by laps", "worst second"]
