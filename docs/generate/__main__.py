@@ -19,8 +19,10 @@ from . import (
     fuzzy_sets,
     library,
     matrix_tables,
+    measured_car_tables,
     metrics,
     monitor_tables,
+    papers,
     rooms,
     schemas,
     signals,
@@ -47,7 +49,9 @@ PAGES: dict[str, Callable[[], str]] = {
     "theory/paper_c_sets.svg": fuzzy_sets.figure,
 }
 """Path in the docs -> what returns its text."""
-PUBLISHED = (blind_tables, car_tables, matrix_tables, monitor_tables, threat_tables)
+PUBLISHED = (
+    blind_tables, car_tables, matrix_tables, measured_car_tables, monitor_tables, threat_tables
+)  # fmt: skip
 """Modules of tables from published runs, which are parts of pages."""
 
 
@@ -65,6 +69,8 @@ def main() -> None:
     for tables in PUBLISHED:
         for page, text in tables.pages_with_tables().items():
             page.write_text(text, encoding="utf-8")
+    for page, text in papers.pages_with_numbers().items():
+        page.write_text(text, encoding="utf-8")
     for kind in kinds():
         (SCHEMAS / f"{kind}.json").write_text(schema_text(kind), encoding="utf-8")
 

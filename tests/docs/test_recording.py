@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import subprocess
 import sys
 from pathlib import Path
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 
 import yawbench as yb
+from docs.generate import measured_car_tables
 from tests.checkout import ROOT
 from tests.refusals import mentions
 from yawbench.measured_cars.fit_file import load_fit
@@ -58,3 +60,38 @@ def test_a_folder_without_the_recording_is_refused(tmp_path):
     ended = subprocess.run(command, check=False, capture_output=True, text=True)
     assert ended.returncode == 1
     assert mentions(ended.stderr, "github.com", "MBDS", "sideslip-angle-vehicle-estimation")
+
+
+@pytest.mark.exhaustive
+def test_the_errors_of_estimators_are_told_lap_by_lap(folder):
+    program = (
+        "import sys; sys.path.insert(0, sys.argv[1]); import convert; "
+        "convert.score(convert.Path(sys.argv[2]))"
+    )
+    subprocess.run([sys.executable, "-c", program, PLACE, folder], check=True)
+    with (folder / measured_car_tables.LAPS.name).open(encoding="utf-8", newline="") as lines:
+        made = list(csv.DictReader(lines))
+    assert [row["case"] for row in made] == [*measured_car_tables.laps()]
+    zero = made[-1]
+    laps = [float(rms) for key, rms in zero.items() if key.startswith("lap ")]
+    assert len(laps) == 3  # of 3.1 km, in 12 km
+    assert laps == pytest.approx([np.degrees(0.02 * 0.3) / np.sqrt(2)] * 3, rel=0.02)
+
+
+def test_the_docs_on_the_measured_car_follow_from_its_errors():
+    for page, text in measured_car_tables.pages_with_tables().items():
+        assert text == page.read_text(encoding="utf-8"), f"python -m docs.generate writes {page.name} anew"
+
+
+def test_the_windows_are_those_of_the_table_of_fits():
+    held, page = measured_car_tables.windows(), measured_car_tables.PAGE.read_text(encoding="utf-8")
+    for model, row in (
+        (measured_car_tables.CAR, "seven degrees of freedom, tyres of Dugoff"),
+        (measured_car_tables.SINGLE_TRACK, "single track with Fiala tyres"),
+    ):
+        rms = {
+            signal: measured_car_tables.rms_of(held[model, signal]) for signal in measured_car_tables.SIGNALS
+        }
+        sideslip = np.degrees(rms["sideslip"])
+        told = f"{rms['yaw_rate']:.4f} rad/s, {rms['acceleration_y']:.2f} m/s², {sideslip:.2f}°"
+        assert any(line.startswith(f"| {row} |") and told in line for line in page.splitlines())

@@ -98,6 +98,9 @@ def test_a_car_is_found_again_and_the_single_track_stands_beside(folder, capsys)
     assert own["sets"] <= 60
     for name in ("yaw_rate", "acceleration_y"):
         assert own["scores"]["held_out"][name]["rms"] < 0.1 * single["scores"]["held_out"][name]["rms"]
+        for model in (own, single):
+            windows = np.array(model["windows"]["held_out"][name])
+            assert np.sqrt(np.mean(windows**2)) == pytest.approx(model["scores"]["held_out"][name]["rms"])
         assert own["scores"]["held_out"][name]["fit"] > 99.9
     assert data["verdict"].startswith("better than")
     assert "held-out" in answer["tables"][-1]["columns"][-1]["heading"]

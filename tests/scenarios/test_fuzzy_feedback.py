@@ -6,8 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from docs.generate.papers import numbers_of
 from tests.judged_studies import judge_all, judge_some, verdicts
-from tests.refusals import sentence_has
+from tests.scenarios.recorded_numbers import assert_recorded
 
 STUDY = Path(__file__).parents[2] / "scenarios" / "fuzzy_feedback" / "study.yaml"
 DEGREE = 0.017453292519943295
@@ -66,32 +67,5 @@ def test_robustness_does_not_reproduce_either(whole):
     assert len(verdicts(whole)) == len(whole["claims"]) + len(whole["checks"])
 
 
-PAGE = (STUDY.parents[2] / "docs" / "papers.md").read_text(encoding="utf-8")
-SECTION = PAGE.partition("## Paper D")[2].partition("\n## ")[0]
-TOLD = " ".join(SECTION.split())
-
-
-def test_the_page_on_papers_tells_what_the_study_found(metric):
-    assert sentence_has(TOLD, f"{metric('off', 'sideslip') / DEGREE:.0f} degrees", "degrees", "sideslip")
-    assert sentence_has(TOLD, f"{100 * metric('both', 'rms'):.1f} %", "RMS", "peak")
-    assert f"({100 * metric('both', 'sideslip_rms'):.0f} % RMS)" in TOLD
-    assert sentence_has(TOLD, f"{metric('both', 'sideslip') / DEGREE:.1f} degrees", "reaches", "degrees")
-    assert sentence_has(TOLD, f"{metric('both', 'sideslip_ref') / DEGREE:.1f}", "reference")
-    assert sentence_has(TOLD, f"{metric('unlimited/fuzzy_feedback', 'sideslip') / DEGREE:.1f}", "reference")
-    assert sentence_has(TOLD, f"{100 * metric('both', 'path'):.1f} %", "RMS", "road")
-    assert sentence_has(
-        TOLD, f"{metric('linear_tyre/off', 'sideslip') / DEGREE:.1f} degrees", "linear", "tyres"
-    )
-    rms = [f"{100 * metric(run, 'rms'):.1f} %" for run in ("yaw_rate_alone", "both")]
-    peaks = [
-        f"{metric(run, 'sideslip') / DEGREE:.1f} degrees" for run in ("yaw_rate_alone", "sideslip_alone")
-    ]
-    assert sentence_has(TOLD, " to ".join(rms), peaks[0], "alone")
-    assert sentence_has(TOLD, peaks[1], "alone")
-
-
-@pytest.mark.exhaustive
-def test_the_page_on_papers_tells_what_becomes_of_what_the_controller_does_not_know(whole, metric_of_all):
-    unknown = [run for run in whole["runs"] if run.startswith("unknown/")]
-    rms, path = (max(100 * metric_of_all(run, name) for run in unknown) for name in ("rms", "path"))
-    assert sentence_has(TOLD, f"{rms:.1f} %", f"{path:.0f} %", "path")
+def test_the_runs_come_to_what_the_docs_are_made_of(study):
+    assert_recorded("D", numbers_of(study["folder"]))

@@ -7,12 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from docs.generate.papers import numbers_of
 from tests.changed import changed
 from tests.command_line import status_of
 from tests.judged_studies import check_figures, judge_all, judge_some, verdicts
-from tests.refusals import sentence_has
-from tests.verdicts import recorded
-from yawbench.figures.display import shown
+from tests.scenarios.recorded_numbers import assert_recorded
 from yawbench.metrics.expressions import MetricValue
 from yawbench.orchestrator.results.reader import load_results
 from yawbench.studies.experiment_result import derive
@@ -214,64 +213,8 @@ def test_under_a_tenth_more_steering_the_sine_loses_the_car_without_control_alon
     assert (near, dry) == pytest.approx((5.28, 2.48), abs=0.02)  # as docs/theory/paper_c.md says
 
 
-ROWS = dict(zip(SCENARIOS, ("double lane change", "hand-wheel sine", "hand-wheel ramp"), strict=True))
-PAGE = (FOLDER.parents[1] / "docs" / "papers.md").read_text(encoding="utf-8")
-SECTION = " ".join(PAGE.partition("## Paper C")[2].partition("\n## ")[0].split())
-
-
-def assert_rows(metric, laws, columns):
-    """Assert that the page's table has the peaks of these laws in these columns."""
-    for road, row in ROWS.items():
-        told = next(line for line in PAGE.splitlines() if line.startswith(f"| {row} |"))
-        cells = [cell.strip() for cell in told.strip("|").split("|")][1:]
-        assert len(cells) == 5
-        assert cells[columns] == [
-            f"{shown(metric(f'{road}/{law}', 'sideslip'), 'rad')}, "
-            f"{shown(metric(f'{road}/{law}', 'yaw_rate'), 'rad/s')}"
-            for law in laws
-        ]
-
-
-def test_the_page_on_papers_tells_what_the_study_found(metric, derived):
-    assert_rows(metric, LAWS, slice(3))
-    assert shown(derived("advantage"), "%", digits=2) in SECTION
-    aside = [
-        f"{metric(f'double_lane_change/{law}', 'displacement'):.3f}" for law in ("pid", "fuzzy_pid", "off")
-    ]
-    assert sentence_has(SECTION, aside[0], f"{aside[1]} m", aside[2], "against")
-    less = [1 - metric(f"{road}/fuzzy_pid", "jerk") / metric(f"{road}/pid", "jerk") for road in SCENARIOS]
-    assert sentence_has(
-        SECTION,
-        ", ".join(f"{100 * x:.1f}" for x in less[:-1]),
-        f"{100 * less[-1]:.1f} %",
-        "lateral",
-        "jerk",
-    )
-    assert shown(metric("ramp/off", "sideslip"), "rad").removesuffix(" °") in SECTION
-
-
-def test_the_page_on_papers_tells_how_far_the_lead_carries():
-    (title,) = (title for title in recorded() if title.startswith("Paper C"))
-    lower = [row for row in recorded()[title] if row.says.endswith("fuzzy PID has lower peaks than PID.")]
-    assert {row.verdict for row in lower} == {"depends on open values"}
-    flips = [row.region.partition(" flip")[0] for row in lower]
-    assert sentence_has(SECTION, *flips, "lane", "ramp", "friction")
-
-
-@pytest.mark.exhaustive
-def test_the_page_on_papers_tells_what_its_variants_found(whole, metric_of_all):
-    assert_rows(metric_of_all, ("pid_tuned", "fuzzy_pid_tuned"), slice(3, 5))
-    for name in ("printed_advantage", "tuned_advantage"):
-        assert shown(whole["derived"][name]["value"], "%", digits=2) in SECTION
-    other = {
-        law: [shown(metric_of_all(f"other/{condition}/{law}", "sideslip"), "rad").removesuffix(" °")
-              for condition in ("mu_0.3", "heavier")]
-        for law in ("pid", "fuzzy_pid", "pid_tuned", "fuzzy_pid_tuned")
-    }  # fmt: skip
-    for law, low in (("fuzzy_pid", "pid"), ("fuzzy_pid_tuned", "pid_tuned")):
-        assert sentence_has(SECTION, *other[law], *other[low], "sideslip", "heavier")
-    for run in ("ramp/pid_printed_limit", "printed_table/1.5", "printed_table/-1.5"):
-        assert shown(metric_of_all(run, "sideslip"), "rad").removesuffix(" °") in SECTION
+def test_the_runs_come_to_what_the_docs_are_made_of(study):
+    assert_recorded("C", numbers_of(study["folder"]))
 
 
 @pytest.mark.exhaustive

@@ -9,8 +9,8 @@ import pytest
 
 import yawbench as yb
 from tests.checkout import ROOT
+from tests.markdown import table_in
 from tests.refusals import sentence_has
-from tests.verdicts import table_in
 
 NEVER = {"monitor.fade_time": 1e9}
 """Lets the monitor watch alone."""

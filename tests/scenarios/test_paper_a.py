@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
+import csv
 from pathlib import Path
 
 import pytest
 
 import yawbench as yb
+from docs.generate.papers import SEEDS, numbers_of
 from tests.judged_studies import check_figures, judge_all, judge_some, verdicts
-from tests.refusals import sentence_has
-from tests.verdicts import recorded
+from tests.scenarios.recorded_numbers import assert_recorded
+from yawbench.cli import main
 from yawbench.components.cars.published_cars import PaperA
-from yawbench.figures.display import shown
 from yawbench.studies.claim_schema import si_number
-from yawbench.studies.experiment_result import judge_results
 from yawbench.studies.load_experiment import load_experiment
-from yawbench.studies.result_tables import run_tables
 from yawbench.vocabulary.gravity import G
 
 STUDY = Path(__file__).parents[2] / "scenarios" / "fnn_sideslip" / "study.yaml"
@@ -145,40 +144,8 @@ def test_the_verdicts_of_the_whole_study_are_those_the_page_on_papers_tells(whol
     assert len(verdicts(whole)) == len(whole["claims"]) + len(whole["checks"])
 
 
-def rows(text):
-    """Return the cells of the Markdown rows about one of the three speeds and a controller."""
-    lines = [line for line in text.splitlines() if line.startswith(("| 15 m/s", "| 25 m/s", "| 40 m/s"))]
-    cells = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
-    return [row for row in cells if row[0].endswith(("control", "fuzzy", "network"))]
-
-
-PAGE = (STUDY.parents[2] / "docs" / "papers.md").read_text(encoding="utf-8")
-PROSE = " ".join(PAGE.partition("## Paper A")[2].partition("\n## ")[0].split())
-
-
-def test_the_page_on_papers_tells_what_the_study_found(study, metric):
-    experiment = load_experiment(STUDY)
-    first, *_ = run_tables(judge_results(experiment, study["folder"]))
-    told = rows(PAGE)
-    assert len(told) == 9
-    found = [[cell.removesuffix(" †") for cell in row] for row in first.text()]
-    assert [[*row[:3], row[-1]] for row in told] == [
-        [row[0], row[1], row[2].partition(" (")[0], row[-1]] for row in found
-    ]
-    of_runs = [claim.says for claim in experiment.spec.claims if claim.short]
-    carries = [list(row[1:]) for row in recorded()[experiment.spec.title] if row.says in of_runs]
-    assert [row[3:-1] for row in told] == carries
-    over = [100 * metric(f"{speed}mps/fuzzy_sideslip", "overshoot") for speed in (15, 40)]
-    assert sentence_has(PROSE, f"{over[0]:.0f}", f"{over[1]:.1f} %", "grows")
-    complete = [f"{100 * metric(f'complete_rule/{speed}mps', 'error'):.2f}" for speed in SPEEDS]
-    assert sentence_has(PROSE, complete[0], complete[1], f"{complete[2]} %", "complete", "750")
-    turned = [f"{100 * study['derived'][f'yaw_{speed}']['value']:.0f}" for speed in SPEEDS]
-    assert sentence_has(PROSE, turned[0], turned[1], f"{turned[2]} %", "yaw", "rate")
-    for law in ("fnn", "off"):
-        aside = [f"{100 * metric(f'{speed}mps/{law}', 'path'):.1f}" for speed in SPEEDS]
-        assert sentence_has(PROSE, aside[0], aside[1], f"{aside[2]} %", "path")
-    acceleration = max(metric(f"{speed}mps/off", "lateral") for speed in SPEEDS)
-    assert sentence_has(PROSE, f"{acceleration:.1f} m/s²", "acceleration", f"{LIFTS:.1f}")
+def test_the_runs_come_to_what_the_docs_are_made_of(study):
+    assert_recorded("A", numbers_of(study["folder"]))
 
 
 def test_danger_of_rolling_over_is_judged_by_the_acceleration_at_which_wheels_lift():
@@ -188,66 +155,22 @@ def test_danger_of_rolling_over_is_judged_by_the_acceleration_at_which_wheels_li
 
 
 @pytest.mark.exhaustive
-def test_the_page_on_papers_tells_what_the_variants_of_the_study_found(whole, metric_of_all):
-    learning, frozen = (
-        [f"{100 * metric_of_all(f'three_periods/15mps/{run}', f'period_{k}'):.1f}" for k in (1, 3)]
-        for run in ("learning_true", "learning_false")
-    )
-    assert sentence_has(PROSE, f"{' to '.join(learning)} %", "error", "falls")
-    assert sentence_has(PROSE, f"{' to '.join(frozen)} %", "frozen", "weights")
-    harm, calm, recalled = (
-        f"{100 * metric_of_all(f'harsh/{run}', 'error'):.0f} %"
-        for run in ("learning_true", "learning_false", "recall")
-    )
-    assert sentence_has(PROSE, harm, calm, "error", "reaches")
-    assert sentence_has(PROSE, recalled, "holds")
-    net_25, fuzzy_25, net_40, fuzzy_40 = (
-        shown(metric_of_all(f"one_input/{run}", "error"), "%")
-        for run in ("25mps/fnn", "25mps/fuzzy_sideslip", "40mps/fnn", "40mps/fuzzy_sideslip")
-    )
-    assert sentence_has(PROSE, net_25, fuzzy_25, net_40, fuzzy_40, "25", "40", "conventional")
-    saved = [f"{100 * whole['derived'][f'grip_{speed}']['value']:.1f}" for speed in SPEEDS]
-    assert sentence_has(PROSE, saved[0], saved[1], f"{saved[2]} %", "tyres")
-    unknown = {
-        speed: max(
-            metric_of_all(run, "error") for run in whole["runs"] if run.startswith(f"unknown/{speed}mps/")
-        )
-        for speed in (15, 40)
-    }
-    assert unknown[15] == metric_of_all("unknown/15mps/lighter", "error")
-    assert sentence_has(PROSE, f"{100 * unknown[15]:.1f} %", f"{100 * unknown[40]:.1f} %", "plant", "lighter")
+def test_unknown_at_15_mps_the_lighter_car_is_the_hardest(whole, metric_of_all):
+    errors = {run: metric_of_all(run, "error") for run in whole["runs"] if run.startswith("unknown/15mps/")}
+    assert max(errors, key=errors.get) == "unknown/15mps/lighter"
 
 
 @pytest.mark.exhaustive
-def test_the_page_on_papers_tells_what_became_of_the_laws_with_motors_that_lag_and_tuned_alike(tmp_path):
+def test_the_laws_with_motors_that_lag_and_tuned_alike_are_in_the_order_of_the_docs(tmp_path):
     found = judge_all(STUDY.with_name("laws.yaml"), tmp_path)
     assert [check["holds"] for check in found["checks"]] == [False, False, True, True, True]
 
-    def error(run):
-        return found["runs"][run]["metrics"]["error"]["value"]
-
-    lost = [shown(error(f"lag/{speed}mps/learning_true"), "%") for speed in (25, 40)]
-    complete = shown(error("lag/40mps/complete_rule"), "%")
-    assert sentence_has(PROSE, lost[0], lost[1], "25", "error", complete, "complete")
-    for runs in ("lag/{}mps/slowly", "tuned_for_lag/{}mps/fnn"):
-        errors = [100 * error(runs.format(speed)) for speed in SPEEDS]
-        assert sentence_has(PROSE, f"{min(errors):.1f}", f"{max(errors):.1f} %", "network")
-    laws = ("learning_false", "fuzzy_sideslip")
-    held = [100 * error(f"lag/{speed}mps/{law}") for speed in (15, 25, 40) for law in laws]
-    assert sentence_has(PROSE, f"{min(held):.1f}", f"{max(held):.1f} %")
-    assert sentence_has(PROSE, shown(error("slow/40mps/fuzzy_sideslip"), "%"), "40")
     laws = ("fnn", "frozen", "fuzzy_sideslip", "pd")
     cost = {law: found["derived"][f"cost_{law}"]["value"] for law in laws}
     assert sorted(cost, key=cost.get) == [*laws]
-    told = [shown(cost[law], "%").removesuffix(" %") for law in laws]
-    assert sentence_has(PROSE, f"{told[0]} %", told[1], "network", "frozen")
-    assert sentence_has(PROSE, told[2], told[3], "PD", "conventional")
     lag = {law: found["derived"][f"lag_cost_{law}"]["value"] for law in laws}
     order = ("fuzzy_sideslip", "frozen", "pd", "fnn")
     assert sorted(lag, key=lag.get) == [*order]
-    told = [shown(lag[law], "%").removesuffix(" %") for law in order]
-    assert sentence_has(PROSE, f"{told[0]} %", told[1], told[2], "PD", "conventional")
-    assert sentence_has(PROSE, told[3], "network")
     for law, name in zip(
         laws, ("fuzzy neural network", "frozen weights", "conventional fuzzy", "PD"), strict=True
     ):
@@ -256,6 +179,22 @@ def test_the_page_on_papers_tells_what_became_of_the_laws_with_motors_that_lag_a
             given = {one["place"]: one["value"] for one in found["runs"][f"{runs}/15mps/{law}"]["changes"]}
             for axis in sought.axes.values():
                 assert axis.start <= given[str(axis.vary[0])] <= axis.end
+
+
+@pytest.mark.exhaustive
+@pytest.mark.parametrize("tuning", ["tuning", "tuning_with_actuators"])
+def test_the_recorded_objectives_of_other_seeds_are_what_a_search_finds(tuning, tmp_path):
+    seed = 2
+    with SEEDS.open(encoding="utf-8", newline="") as lines:
+        rows = [row for row in csv.DictReader(lines) if (row["tuning"], row["seed"]) == (tuning, str(seed))]
+    with pytest.raises(SystemExit) as ended:
+        main(["tune", str(STUDY.with_name(f"{tuning}.yaml")), "--seed", str(seed), "--out", str(tmp_path)])
+    assert not ended.value.code
+    with (tmp_path / "trials.csv").open(encoding="utf-8", newline="") as lines:
+        trials = [row for row in csv.DictReader(lines) if row["objective"]]
+    for row in rows:
+        least = min(float(trial["objective"]) for trial in trials if trial["law"] == row["law"])
+        assert least == pytest.approx(float(row["objective"]), rel=1e-4)
 
 
 @pytest.mark.exhaustive

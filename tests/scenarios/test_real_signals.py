@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import yawbench as yb
+from tests.markdown import table_in
 from tests.refusals import sentence_has
-from tests.verdicts import table_in
 from yawbench.cli import main
 from yawbench.studies.load_experiment import load_experiment
 

@@ -136,3 +136,47 @@ def test_the_jackknife_of_a_mean_is_the_interval_of_student():
     numbers = np.array([3.1, 2.9, 3.4, 3.3, 2.7])
     value, half = jackknife(lambda some: numbers[some].mean(keepdims=True), 5)
     assert (value[0], half[0]) == pytest.approx(interval(list(numbers)))
+
+
+@pytest.mark.parametrize(("spread", "correlation"), [(0.3, 0.5), (0.6, 0.8), (1.0, 0.95)])
+def test_of_ratios_of_ten_pairs_the_jackknife_covers_what_a_bootstrap_does_not(spread, correlation):
+    chance = np.random.default_rng(7)
+    mixed = np.linalg.cholesky(spread**2 * np.array([[1.0, correlation], [correlation, 1.0]]))
+
+    def ratio(some):
+        return np.log(pairs[0, some].sum(axis=-1) / pairs[1, some].sum(axis=-1))
+
+    held = np.zeros((1500, 2), dtype=bool)  # the true ratio is 1
+    for k in range(len(held)):
+        pairs = np.exp(mixed @ chance.standard_normal((2, 10)))
+        value, half = jackknife(ratio, 10)
+        low, high = np.quantile(ratio(chance.integers(10, size=(400, 10))), [0.025, 0.975])
+        held[k] = abs(value) <= half, low <= 0.0 <= high
+    by_jackknife, by_bootstrap = held.mean(axis=0)
+    assert 0.9 <= by_jackknife <= 0.97
+    assert by_bootstrap < by_jackknife - 0.02
+
+
+@pytest.mark.parametrize(("of_laps", "of_places"), [(0.3, 0.4), (0.35, 0.7), (0.5, 0.8)])
+def test_of_five_laps_over_the_same_bends_student_covers_and_pieces_tell_nothing_of_other_bends(
+    of_laps, of_places
+):
+    chance = np.random.default_rng(2)
+    laps, places = 5, 10
+
+    def squares(bends, number):
+        lap = np.exp(chance.normal(0.0, of_laps, (number, 1)))
+        return bends * lap * np.exp(chance.normal(0.0, of_places, (number, places)))
+
+    held = np.zeros((500, 2), dtype=bool)
+    for k in range(len(held)):
+        bends = np.exp(chance.normal(0.0, 1.5, places))
+        pieces = squares(bends, laps)
+        mean, half = interval(list(np.sqrt(pieces.mean(axis=1))))
+        truth = np.sqrt(squares(bends, 1000).mean(axis=1)).mean()
+        resampled = pieces.ravel()[chance.integers(pieces.size, size=(300, pieces.size))].mean(axis=1)
+        low, high = np.quantile(resampled, [0.025, 0.975])
+        held[k] = abs(mean - truth) <= half, low <= np.exp((1.5**2 + of_laps**2 + of_places**2) / 2) <= high
+    same_bends, other_bends = held.mean(axis=0)
+    assert 0.91 <= same_bends <= 0.97
+    assert other_bends < 0.65

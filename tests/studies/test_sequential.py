@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from tests.checkout import ROOT
-from tests.verdicts import table_in
+from tests.markdown import table_in
 from yawbench.studies.axes import RegionSpec, hypercube
 from yawbench.studies.claims import ONE_IN
 from yawbench.studies.confidence import TAIL, Decision, SequentialTest, share_bounds
@@ -117,6 +117,13 @@ def test_the_interval_agrees_with_the_decision_and_has_its_confidence():
         low, high = bounds(int(outcomes[:number].sum()), number)
         missed += not low <= share <= high
     assert missed <= 0.05 * 2000
+
+
+def test_the_docs_tell_how_many_points_decide():
+    told = {row[0].partition(":")[0]: row[1:] for row in table_in(PAGE.read_text(encoding="utf-8"))}
+    assert told["points"] == [str(look) for look in TEST.looks]
+    assert told["robust"] == [str(low) if low >= 0 else "-" for low, _ in TEST.boundaries]
+    assert told["above 10 %"] == [str(high) for _, high in TEST.boundaries]
 
 
 def test_a_single_look_has_the_interval_of_clopper_and_pearson():

@@ -164,6 +164,13 @@ class FitResult:
                 }
                 for part in PARTS
             },
+            "windows": {
+                part: {
+                    name: [score_of([pair]).rms for pair in self._pairs(model, part, name)]
+                    for name in self.fit.errors
+                }
+                for part in PARTS
+            },
         }  # fmt: skip
 
 

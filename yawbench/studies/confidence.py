@@ -226,7 +226,9 @@ def jackknife(statistic: Callable[[np.ndarray], np.ndarray], number: int) -> tup
         number: of members.
 
     For standard deviations of 8 to 10 members 80 to 97 % of the intervals of 95 % hold the truth, for
-    differences of two 91 to 96 % (a simulation with normal, exponential and mixed members).
+    differences of two 91 to 96 % (a simulation with normal, exponential and mixed members). For the logarithm
+    of a ratio of sums over ten pairs 92 to 95 %, percentiles of a bootstrap 88 to 90 % (lognormal members
+    with a spread of 0.3 to 1 and correlations of 0.5 to 0.95).
     """
     everybody = np.arange(number)
     without = np.array([statistic(np.delete(everybody, k)) for k in everybody])
