@@ -24,6 +24,7 @@ LAYERS = (
     "orchestrator",
     "yawbench.vehicles",
     "yawbench.metrics",
+    "yawbench.events",
     "yawbench.figures",
     "yawbench.tyre_stand",
     "yawbench.planner",
