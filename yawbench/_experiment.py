@@ -9,10 +9,10 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from yawbench.events.kinds import WarningWatch
 from yawbench.fmus.fmu import Value
 from yawbench.foundation.errors import Diagnostic, ScenarioError
 from yawbench.foundation.messages import short
-from yawbench.metrics.plausibility import PlausibilityWatch
 from yawbench.orchestrator.master.fmi import open_instance
 from yawbench.orchestrator.master.run_lifecycle import OpenInstance
 from yawbench.orchestrator.master.simulate import simulate_in_memory
@@ -212,7 +212,7 @@ def executed(
 
 def _in_memory(job: Job, opener: OpenInstance = open_instance) -> Results:
     assert job.plan is not None
-    return simulate_in_memory(job.plan, opener=opener, watch=PlausibilityWatch(job.plan))
+    return simulate_in_memory(job.plan, opener=opener, watch=WarningWatch(job.plan))
 
 
 @dataclass(frozen=True)

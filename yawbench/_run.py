@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
+    from yawbench.studies.tables import Table
+
 
 def measured(file: str | Path, segment: int | None = None, *, start: float = 0.0) -> Run:
     """Return a recording of a car as a run, for `metric`, `plot`, `evaluate` and `view`.
@@ -91,6 +93,34 @@ class Run:
         ('value-implausible', 'driver.target_speed', 300.0)
         """
         return self.results.record.all_diagnostics
+
+    @property
+    def events(self) -> Table:
+        """What began and ended when in the run: a table with a row per event, in the order of their begin.
+
+        >>> run.events.headings
+        ['time', 'until', 'event', 'where', 'value', 'limit', 'unit', 'signal']
+        >>> run.events.rows[0][2]
+        'steering'
+        """
+        from yawbench.studies.listings import events_table
+
+        return events_table(self.results)
+
+    def why(self, best: Run | None = None) -> list[str]:
+        """Return at most three sentences on why the car was lost, the cause first; empty if it was not.
+
+            >>> run.why()
+            []
+
+        Args:
+            best: a run under the same conditions that did better, to compare with.
+        """
+        from yawbench.events.kinds import events_in
+        from yawbench.events.why import why
+
+        beside = None if best is None else events_in(best.results)
+        return [str(reason) for reason in why(events_in(self.results), beside)]
 
     @property
     def changes(self) -> tuple[Override, ...]:

@@ -10,6 +10,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
+from yawbench.events.kinds import WarningWatch
 from yawbench.fmus.fmu import Fmu, RunsAs, Value
 from yawbench.foundation.errors import (
     Diagnostic,
@@ -21,7 +22,6 @@ from yawbench.foundation.errors import (
     warnings_in,
 )
 from yawbench.foundation.messages import hint, short
-from yawbench.metrics.plausibility import PlausibilityWatch
 from yawbench.orchestrator.fault_kinds import FaultList, FaultName
 from yawbench.orchestrator.master.log import Log
 from yawbench.orchestrator.master.simulate import simulate_in_memory
@@ -272,14 +272,14 @@ class Scenario:
             plan, report = self.plan(), called or shown.update
             try:
                 try:
-                    watch = PlausibilityWatch(plan)
+                    watch = WarningWatch(plan)
                     run = Run(simulate_in_memory(plan, opener=opener, watch=watch, progress=report))
                 except SimulationError as error:
                     if (again := self._in_python(plan, str(error))) == plan:
                         raise
                     opened.clear()
                     # It ends, or fails again, with the exception.
-                    run = Run(simulate_in_memory(again, opener=opener, watch=PlausibilityWatch(again)))
+                    run = Run(simulate_in_memory(again, opener=opener, watch=WarningWatch(again)))
             except SimulationError as error:
                 warn(with_changes(plan.title, plan.changes), (*plan.diagnostics, *error.warnings))
                 ended = [instance for instance in opened if instance.name == error.instance]

@@ -30,7 +30,7 @@ from ..results.freshness import key_of
 from ..results.reader import Results
 from ..results.record_of_plan import recorded_variables, run_record, units_of
 from ..results.recorder import MemoryRecorder, Recorder, recorder_of
-from ..results.run_record import EndRecord, ErrorRecord, RunStatus, WarningRecord
+from ..results.run_record import EndRecord, ErrorRecord, EventRecord, RunStatus, WarningRecord
 from .child_run import ChildRun, can_be_apart
 from .fmi import keeps, open_instance
 from .isolation import Isolation
@@ -44,13 +44,16 @@ IN_MEMORY = 16 * 10**9
 
 
 class Watch(Protocol):
-    """Observer of a run: looks at the rows as they are recorded, and warns of what it has seen."""
+    """Observer of a run: looks at the rows as they are recorded, and says what it has seen."""
 
     def look(self, rows: np.ndarray, /) -> None:
         """Look at rows: shape (n, 1 + Real columns), time first."""
 
     def warnings(self) -> tuple[Diagnostic, ...]:
         """Return the warnings so far."""
+
+    def events(self) -> list[EventRecord] | None:
+        """Return the events so far, in the order of their begin; None if it does not look for them."""
 
 
 @dataclass(frozen=True)
@@ -66,6 +69,7 @@ class RunInfo:
     warnings: list[Message] = field(default_factory=list)
     ended: str | None = None  # why an instance ended it before its stop time
     diagnostics: tuple[Diagnostic, ...] = ()  # about its course, such as a car that spins
+    events: tuple[EventRecord, ...] = ()  # in the order of their begin
 
 
 def simulate(
@@ -118,6 +122,7 @@ def simulate(
         list(run.log.warnings()),
         None if run.course.ended is None else str(run.course.ended),
         run.diagnostics,
+        tuple(run.record.events),
     )
 
 
@@ -284,6 +289,9 @@ class Simulation:
         record.error = self._explained(error)
         record.units_freed = False
         record.diagnostics = [*self.plan.diagnostics, *self.diagnostics]
+        events = self._watch.events() if self._watch else None
+        if events is not None:
+            record.events = events
         if ended is not None:
             record.ended = EndRecord(instance=ended.instance, time=ended.time, message=str(ended))
         self._note_warnings()

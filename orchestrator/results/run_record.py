@@ -184,6 +184,19 @@ class FaultRecord(_Part):
         return f"{self.on}: {self.fault}"
 
 
+class EventRecord(_Part):
+    """Something that happened in a run: when it began and ended [s], where, how far beyond which limit."""
+
+    time: float = 0.0
+    until: float | None = None  # None: it lasted to the end of the run
+    kind: str = ""
+    where: str = ""  # a wheel, an axle, a signal; "" for the whole car
+    value: float | None = None  # furthest, in `unit`
+    limit: float | None = None
+    unit: str = ""
+    signal: str = ""  # the column in which it is seen best
+
+
 class OverrideRecord(_Part):
     """An override of a value of the scenario file."""
 
@@ -248,6 +261,7 @@ class RunRecord(_Part):
     changes: list[OverrideRecord] = []
     connections: list[ConnectionRecord] = []
     faults: list[FaultRecord] = []
+    events: list[EventRecord] = []  # in the order of their begin
     diagnostics: list[RecordedDiagnostic] = []
     scenario: RecordedScenario = {}
     versions: dict[str, str] = {}

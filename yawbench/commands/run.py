@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import textwrap
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -15,6 +15,10 @@ from yawbench.foundation.messages import printable
 
 from .options import CHANGES, MAKING, RunOptions, ScenarioFile, plan_of_scenario, takes
 from .output import print_tables, say, shows_bars, tabular
+
+if TYPE_CHECKING:
+    from yawbench.orchestrator.results.run_record import EventRecord
+
 
 MetricsOption = Annotated[
     list[str] | None,
@@ -48,7 +52,7 @@ def run(
     appended to the name. They replace those of an earlier run, but a failed run never replaces a
     completed one: its results go to failed/ in that folder.
     """
-    from yawbench.metrics.plausibility import PlausibilityWatch
+    from yawbench.events.kinds import RunWatch
     from yawbench.orchestrator.master.compiled_loop import slower_because
     from yawbench.orchestrator.master.isolation import opener_of
     from yawbench.orchestrator.master.log import STATUS, WARNING
@@ -84,7 +88,7 @@ def run(
                 folder,
                 progress=progress,
                 opener=opener,
-                watch=PlausibilityWatch(plan),
+                watch=RunWatch(plan),
                 format=options.format_,
                 apart=True,
             )
@@ -100,6 +104,7 @@ def run(
     if info.ended:
         say(f"ended: {info.ended}")
     _say_warnings(info.diagnostics)
+    _say_why(info.events)
     say(f"{folder}: {info.rows} rows of {info.columns} variables in {info.wall_time:.2f} s")
     output.answer(
         folder=folder, rows=info.rows, columns=info.columns, wall_time=info.wall_time, ended=info.ended
@@ -115,6 +120,16 @@ def run(
         output.answer(
             metrics={name: {"value": value.number, "unit": value.unit} for name, value in numbers.items()}
         )
+
+
+def _say_why(events: Sequence[EventRecord]) -> None:
+    """Say why the car was lost, if it was; all events stand in run.json."""
+    from yawbench.events.why import why
+
+    reasons = why(events)
+    output.answer(events=[event.model_dump(exclude_unset=True) for event in events], why=[*map(str, reasons)])
+    if reasons:
+        say(f"lost: {'; '.join(map(str, reasons))}")
 
 
 def _say_warnings(diagnostics: Iterable[Diagnostic]) -> None:

@@ -16,8 +16,8 @@ from yawbench import arguments
 from yawbench._run import Run
 from yawbench._run_many import opener_of
 from yawbench._scenario import load
+from yawbench.events.kinds import WarningWatch
 from yawbench.foundation.errors import ScenarioError
-from yawbench.metrics.plausibility import PlausibilityWatch
 from yawbench.orchestrator.master.simulate import simulate_in_memory
 from yawbench.orchestrator.plan import Plan
 from yawbench.orchestrator.results.reader import Results
@@ -149,7 +149,7 @@ class SineWithDwell(gymnasium.Env[Observation, np.ndarray]):
     def _drive(self, plan: Plan) -> None:
         """Make a run in a separate thread, in which the controller waits for every action."""
         try:
-            opener, watch = opener_of(self._scenario._programs), PlausibilityWatch(plan)
+            opener, watch = opener_of(self._scenario._programs), WarningWatch(plan)
             self._hand.requests.put(simulate_in_memory(plan, opener=opener, watch=watch))
         except BaseException as error:  # including `_Abandoned`
             self._hand.requests.put(error)

@@ -1,4 +1,4 @@
-"""Measures of signals (`peak`, `rms`, ...), metrics of runs, verdicts, and plausibility warnings.
+"""Measures of signals (`peak`, `rms`, ...), metrics of runs and verdicts.
 
 A measure is a function in `measures`; `expressions` parses `peak(sideslip) from 1 s` and finds its signals in
 a run.

@@ -249,7 +249,7 @@ def run_job(job: Job, opener: OpenInstance | None = None) -> MeasuredRun:
     Raises:
         YawbenchError: the scenario is wrong or the run failed.
     """
-    from yawbench.metrics.plausibility import PlausibilityWatch
+    from yawbench.events.kinds import RunWatch, WarningWatch
     from yawbench.orchestrator.master.isolation import opener_of
     from yawbench.orchestrator.master.run_lifecycle import StepClock, timing
     from yawbench.orchestrator.master.simulate import simulate, simulate_in_memory
@@ -261,13 +261,13 @@ def run_job(job: Job, opener: OpenInstance | None = None) -> MeasuredRun:
         if job.keep:
             apart = timed is own  # a step clock and instances in plain Python need this process
             run = simulate(
-                plan, job.out, opener=timed, watch=PlausibilityWatch(plan), format=job.format, apart=apart
+                plan, job.out, opener=timed, watch=RunWatch(plan), format=job.format, apart=apart
             ).id
             if not (job.metrics or job.test):
                 return MeasuredRun({}, id=run)
             results = load_results(job.out)
         else:
-            results = simulate_in_memory(plan, opener=timed, watch=PlausibilityWatch(plan))
+            results = simulate_in_memory(plan, opener=timed, watch=WarningWatch(plan))
         record = measured(results, job.metrics, job.test)
     time = {STEP_TIME: (clock.mean, "s")} if clock.steps else {}
     return replace(record, values={**record.values, **time}, id=run)
@@ -279,11 +279,11 @@ def recorded(job: Job) -> Results:
     Raises:
         YawbenchError: the scenario is wrong or the run failed.
     """
-    from yawbench.metrics.plausibility import PlausibilityWatch
+    from yawbench.events.kinds import WarningWatch
     from yawbench.orchestrator.master.simulate import simulate_in_memory
 
     plan = job.plan or planned(job)[1]
-    return simulate_in_memory(plan, watch=PlausibilityWatch(plan))
+    return simulate_in_memory(plan, watch=WarningWatch(plan))
 
 
 def measured(results: Results, metrics: MetricRequests, test: TestRequest | None = None) -> MeasuredRun:

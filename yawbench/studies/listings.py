@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from yawbench.events.kinds import events_in
 from yawbench.fmus.archive import open_fmu, runs_as
 from yawbench.fmus.fmu import Fmu
 from yawbench.foundation.errors import Diagnostic, ModelDescriptionError, ResultsError, ScenarioError
@@ -37,7 +38,7 @@ from yawbench.vocabulary.wheels import WHEELS
 if TYPE_CHECKING:
     from yawbench.orchestrator.results.reader import Results
 
-from .tables import Cell, Table
+from .tables import Cell, Column, Table
 
 
 def metrics_of_run(results: Results, names: Sequence[str]) -> Table:
@@ -50,6 +51,19 @@ def metrics_of_run(results: Results, names: Sequence[str]) -> Table:
     missing = [name for name in names if name not in values]
     notes = [f"No number for {', '.join(missing)}."] if missing else []
     return Table(title, ["metric", "", "value"], rows, notes)
+
+
+def events_table(results: Results) -> Table:
+    """Return a table of a run's events in the order of their begin, one row each."""
+    columns = [Column(name, "float64", {"unit": "s"}) for name in ("time", "until")]
+    columns += [Column(name, "string") for name in ("event", "where")]
+    columns += [Column(name, "float64") for name in ("value", "limit")]
+    columns += [Column(name, "string") for name in ("unit", "signal")]
+    rows: list[Sequence[Cell]] = [
+        [one.time, one.until, one.kind, one.where, one.value, one.limit, one.unit, one.signal]
+        for one in events_in(results)
+    ]
+    return Table("Events", columns, rows)
 
 
 PEAKS = ("sideslip", "yaw_rate", "acceleration_y")

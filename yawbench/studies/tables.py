@@ -11,6 +11,8 @@ from dataclasses import dataclass, field
 from itertools import chain, zip_longest
 from typing import TYPE_CHECKING, Any, Literal
 
+from yawbench.events.kinds import events_in
+from yawbench.events.why import furthest_aside, lost, why
 from yawbench.figures.display import shown
 from yawbench.foundation.errors import text_of
 from yawbench.foundation.messages import printable
@@ -402,8 +404,20 @@ def marked(label: str, results: Results) -> str:
 
 
 def remarks(runs: Iterable[tuple[str, Results]]) -> list[str]:
-    """Return a note for each marked run of (label, results)."""
-    return [f"{MARK} {label}: {says}" for label, results in runs if (says := _remarkable(results))]
+    """Return a note for each marked run of (label, results), and why a car was lost.
+
+    Where several runs are compared, with the one that turned aside least beside.
+    """
+    shown = [*runs]
+    notes = [f"{MARK} {label}: {says}" for label, results in shown if (says := _remarkable(results))]
+    events = [events_in(results) for _, results in shown]
+    best = (
+        min((e for e in events if not lost(e)), key=furthest_aside, default=None) if len(shown) > 1 else None
+    )
+    for (label, _), own in zip(shown, events, strict=True):
+        if reasons := why(own, best):
+            notes.append(f"{label}: lost because {'; '.join(map(str, reasons))}")
+    return notes
 
 
 def _remarkable(results: Results) -> str:

@@ -12,9 +12,9 @@ import pytest
 
 from tests.orchestrator.recorded import car, noted
 from tests.refusals import mentions
+from yawbench.events.kinds import EVENTS, WARNED, WarningWatch
 from yawbench.fmus.fmu import Fmu, Variable
 from yawbench.foundation.errors import Diagnostic, Location, warnings_in
-from yawbench.metrics.plausibility import CHECKS, PlausibilityWatch
 from yawbench.orchestrator.plan import Instance, Plan, Wire
 from yawbench.orchestrator.results.run_record import RunRecord
 from yawbench.orchestrator.signal_names import SignalName
@@ -38,7 +38,7 @@ def plan(**outputs):
 
 def found(made, *columns, blocks=4):
     """Return the findings on columns that come in blocks, by kind."""
-    watch = PlausibilityWatch(made)
+    watch = WarningWatch(made)
     time = np.linspace(0.0, 1.0, len(columns[0]))
     for rows in np.array_split(np.column_stack([time, *columns]), blocks):
         watch.look(rows)
@@ -105,9 +105,10 @@ def test_values_that_are_not_finite_are_no_findings():
     assert found(plan(sideslip={}), np.array([0.0, np.nan, 0.1])) == {}
 
 
-def test_every_check_says_where_its_limit_comes_from():
-    assert all(check.why.startswith("chosen: ") for check in CHECKS)
-    assert len({check.code for check in CHECKS}) == len(CHECKS)
+def test_every_kind_of_event_says_where_its_limit_comes_from():
+    kinds = (*WARNED, *EVENTS)
+    assert all(kind.why for kind in kinds)
+    assert len({kind.name for kind in kinds}) == len(kinds)
 
 
 def test_a_run_with_findings_is_marked_in_tables():

@@ -1,0 +1,112 @@
+"""Why a car was lost: runs with known causes, whose first sentence names the cause."""
+
+from __future__ import annotations
+
+import warnings
+
+import pytest
+
+import yawbench as yb
+
+SWD = "proving_ground/sine_with_dwell"
+LATE_RELEASE = {"wheel_control.release_slip": 0.2, "wheel_control.full_release_slip": 0.4}
+
+
+class Proportional:
+    """A yaw moment in proportion to the error of the yaw rate."""
+
+    inputs = ("yaw_rate_ref", "yaw_rate")
+    outputs = ("yaw_moment",)
+
+    def __init__(self, gain=1e5, begin=0.0, most=1e4):
+        self.gain, self.begin, self.most = gain, begin, most
+
+    def output(self, t, u):
+        if t < self.begin:
+            return 0.0
+        return max(-self.most, min(self.most, self.gain * (u.yaw_rate_ref - u.yaw_rate)))
+
+
+def driven(law="off", scenario=SWD, fault=None, **changes):
+    """Return the run of a car that is hard to hold, with a law and changes."""
+    vehicle = {"vehicle": "scenarios/vehicles/hard.yaml"} if scenario.startswith(SWD) else {}
+    own = {name.replace("__", "."): value for name, value in changes.items()}
+    if law == "off":
+        made = yb.load(scenario).set({**vehicle, **own})
+    else:
+        made = yb.load(scenario).swap(controller=law).set({**vehicle, **LATE_RELEASE, **own})
+    if fault:
+        made = made.fault(fault[0], **fault[1])
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return made.run()
+
+
+CAUSES = {
+    "no controller": (dict(), ("nothing acts",)),
+    "wrong sign": (dict(law=Proportional(-1e5)), ("wrong sign",)),
+    "late controller": (dict(law=Proportional(begin=3.0)), ("late", "3.00 s")),
+    "saturated moment": (dict(law=Proportional(most=700.0)), ("limit", "700 N.m")),
+    "saturated law": (
+        dict(law="controller_fuzzy_sliding_mode", controller__moment_limit=1000),
+        ("limit", "1 kN.m"),
+    ),
+    "slow brakes": (dict(law=Proportional(), wheel_control__pressure_rise_limit=2e6), ("wheels are late",)),
+    "delayed brakes": (dict(law=Proportional(), wheel_control__pressure_lag=3.0), ("wheels are late",)),
+    "moment delayed": (
+        dict(law=Proportional(), fault=("controller.yaw_moment", dict(kind="delay", value=0.4))),
+        ("fault", "controller.yaw_moment"),
+    ),
+    "gyro frozen": (
+        dict(
+            law=Proportional(), scenario=f"{SWD}_sensors",
+            fault=("sensor.yaw_rate", dict(kind="freeze", start=1.8)),
+        ),
+        ("fault", "sensor.yaw_rate", "1.80 s"),
+    ),
+    "brakes released": (
+        dict(law="controller_pid", wheel_control__release_slip=0.05, wheel_control__full_release_slip=0.1),
+        ("released",),
+    ),
+    "lane change too fast": (
+        dict(scenario="proving_ground/iso_3888_2", speed="95 km/h"), ("nothing acts",),
+    ),
+    "friction falls": (
+        dict(scenario=f"{SWD}_split", driver__amplitude="90 deg", road__patches="0.3: x > 50"),
+        ("friction", "falls", "33.3 %"),
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("made", "named"), CAUSES.values(), ids=CAUSES)
+def test_the_first_sentence_names_the_cause(made, named):
+    run = driven(**made)
+    first, *_ = run.why()
+    assert all(word in first for word in named), run.why()
+    assert len(run.why()) <= 3
+
+
+def test_a_car_that_is_held_has_no_reason_to_be_lost():
+    run = driven(Proportional())
+    assert run.why() == []
+    assert "steering" in [row[2] for row in run.events.rows]
+
+
+def test_the_best_run_beside_is_compared_with_by_when_it_acts():
+    lost, held = driven(Proportional(begin=3.0)), driven(Proportional())
+    assert any("best controller begins to act" in sentence for sentence in lost.why(held))
+
+
+def test_events_of_a_record_are_those_found_in_its_results(tmp_path):
+    """What a run writes into its record while it goes on is what a look at its results finds."""
+    from yawbench.events.kinds import RunWatch, events_in
+    from yawbench.orchestrator.master.simulate import simulate
+    from yawbench.orchestrator.results.reader import load_results
+
+    plan = yb.load(SWD).set({"stop_time": 3.5}).plan()
+    simulate(plan, tmp_path / "run", watch=RunWatch(plan))
+    results = load_results(tmp_path / "run")
+    written = results.record.events
+    assert written
+    results.record.model_fields_set.discard("events")
+    assert events_in(results) == written
