@@ -38,7 +38,6 @@ def quick(monkeypatch):
     """Fewer steps, and libraries for Linux that are compiled fast."""
     build.toolchain()  # the real one is kept for the whole process
     monkeypatch.setattr(build, "LINUX", ("-O0",))
-    monkeypatch.setattr(build, "TO_WINDOWS", "no compiler")
     with fewer_steps():
         yield
 
