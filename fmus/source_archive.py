@@ -13,6 +13,7 @@ EXACTLY = b"""/* As the options of the build description, which not every host p
 #elif defined __GNUC__
 #pragma GCC optimize("fp-contract=off", "rounding-math")
 #endif
+#define YAWBENCH_OLDEST_GLIBC_H /* compiled where it runs, for this glibc */
 """
 DESCRIPTION = f"{FOLDER}/buildDescription.xml"
 
