@@ -205,7 +205,7 @@ def test_no_run_waits_for_a_native_library_that_takes_long(own, yawbench, monkey
     monkeypatch.setenv("YAWBENCH_CACHE", str(own / "cache"))
     native_build.toolchain()  # the real one is kept for the whole process
     monkeypatch.setattr(recipe, "MINGW", "no compiler")
-    monkeypatch.setattr(native_build, "LINUX", ("-O0",))
+    monkeypatch.setattr(native_build, "LINUX", ("-O0", "-fPIC"))
     build = ("build", OWN, "--out", "fmus")
     yawbench(*build)  # from now on it is known what the library takes
     yawbench("run", "driver.yaml", "--out", "out")
