@@ -143,8 +143,12 @@ def _variables(root: Element) -> Iterator[dict[str, str]]:
     }
     for variable, name in zip(variables, names, strict=True):
         annotation = variable.find("Annotations/Tool[@name='yawbench']/variable")
+        choices = [] if annotation is None else annotation.get("choices", "").split(", ")
+        start = variable[0].get("start")
+        chosen = {"start": choices[int(start) - 1]} if variable[0].tag == "Enumeration" and start else {}
         yield {
             **variable[0].attrib,
+            **chosen,
             **variable.attrib,
             "meaning": variable.get("description", ""),
             "depends directly on": follows.get(name, ""),
