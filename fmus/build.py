@@ -3,9 +3,10 @@
     build_all(out)                       all components of the project, in Python or in C
     build_component(source, out, ...)    any component, optionally with other default values
 
-An FMU is current if it was built from the same sources, by the same builder, with the same
-launcher; a key of all these is in the stamp of its archive. If a component cannot be built, its old
-FMU is kept, but runs do not use it (see `rebuild_stale`).
+An FMU is current if it was built from the same sources by the same builder, whichever compiler was
+installed; a key of these is in the stamp of its archive. One that lacks its native library for want of a
+compiler is built again when there is one. If a component cannot be built, its old FMU is kept, but runs do
+not use it (see `rebuild_stale`).
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import functools
 import os
 import sys
 import tempfile
+import zipfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -25,13 +27,13 @@ from yawbench.foundation.safe_files import write_whole
 from yawbench.foundation.workers import Pool
 from yawbench.vocabulary.roles import ROLES
 
-from .archive import REASON, runs_as
-from .build_stamp import BuildStamp, read_stamp
+from .archive import runs_as
+from .build_stamp import PLAIN, BuildStamp, Edition, read_stamp
 from .c.c_recipe import CRecipe, find_c_components
 from .check import defects, reference_files
-from .compiler import compile_launcher
-from .native.build import LATER
-from .packing import to_bytes
+from .compiler import TO_WINDOWS, Platform, can_compile, compile_launcher
+from .fmi3_archive import ONLY_FMI2, to_fmi3
+from .packing import python_libraries, to_bytes
 from .presentation import CREDITS, presented
 from .recipe import TOOL, PythonRecipe, natural_name
 from .source_files import Parts, Sources, UserModules
@@ -55,6 +57,10 @@ class Report:
     in_python: dict[str, str] = field(default_factory=dict)  # built without a native library -> why
     notes: dict[str, str] = field(default_factory=dict)  # native -> what of it was never compared with Python
     warning: str = ""  # reason if the FMUs have no launcher
+    only_fmi2: dict[str, str] = field(default_factory=dict)  # not built as FMI 3.0 -> why
+    not_on_windows: list[str] = field(
+        default_factory=list
+    )  # native here, without a native library for Windows
 
 
 def find_components(root: Path = COMPONENTS) -> dict[str, Parts]:
@@ -83,6 +89,7 @@ def build_all(
     force: bool = False,
     progress: BuildProgress | None = None,
     root: Path = COMPONENTS,
+    edition: Edition = PLAIN,
 ) -> Report:
     """Build changed components into `out`: all, or those with the given FMU names.
 
@@ -102,12 +109,15 @@ def build_all(
     report_progress = progress or (lambda name, what: None)
     stale = []
     for name in chosen:
-        if not force and _is_current(known[name], out / f"{name}.fmu", root):
+        if not force and _is_current(known[name], out / f"{name}.fmu", root, edition):
             report.current.append(name)
             report_progress(name, "current")
         else:
             stale.append(name)
-    for name, problems in _built(stale, known, out, root):
+    for name, problems in _built(stale, known, out, root, edition):
+        if [problem.code for problem in problems] == [ONLY_FMI2]:
+            report.only_fmi2[name] = problems[0].message
+            continue
         if problems:
             errors[name] = problems
         else:
@@ -122,7 +132,9 @@ def build_all(
             report.in_python[name] = how.why
         elif how is not None and how.note:
             report.notes[name] = how.note
-    if any(isinstance(known[name], PythonRecipe) for name in report.built):
+        if not has_native_library(out / f"{name}.fmu", TO_WINDOWS):
+            report.not_on_windows.append(name)
+    if edition.fmi == 2 and any(isinstance(known[name], PythonRecipe) for name in report.built):
         report.warning = compile_launcher()[1]
     if components is None and out.is_dir():
         for fmu in sorted(out.glob("*.fmu")):
@@ -134,25 +146,34 @@ def build_all(
     return report
 
 
-def _is_current(recipe: Recipe, target: Path, root: Path) -> bool:
+def _is_current(recipe: Recipe, target: Path, root: Path, edition: Edition) -> bool:
     try:
-        return read_stamp(target) == replace(component_stamp(recipe, root), key=recipe.key(), tool=TOOL)
+        stamp = replace(component_stamp(recipe, root, edition), key=recipe.key(), tool=TOOL)
+        return _suffices(read_stamp(target), stamp, hurry=False)
     except (BuildError, OSError):
         return False
 
 
+def _suffices(present: BuildStamp | None, wanted: BuildStamp, *, hurry: bool) -> bool:
+    """Return whether an FMU has all that is wanted, but for a native library that it cannot have now."""
+    if present is None:
+        return False
+    wanted = replace(wanted, edition=wanted.edition | present.edition)
+    return present == wanted or (present == wanted.unfinished() and (hurry or not can_compile()))
+
+
 def _built(
-    names: list[str], known: Mapping[str, Recipe], out: Path, root: Path
+    names: list[str], known: Mapping[str, Recipe], out: Path, root: Path, edition: Edition
 ) -> Iterator[tuple[str, list[Diagnostic]]]:
     """Build components in parallel; yield each name with its errors, in the order of the names."""
     if len(names) < 2 or sys.platform == "win32":
         for name in names:
-            yield name, errors_of(known[name], out, root)
+            yield name, errors_of(known[name], out, root, edition)
         return
     ended: dict[int, list[Diagnostic]] = {}
     due = 0
     with Pool(preload=[__name__]) as pool:
-        for finished in pool.each(_build_one, [(name, out, root) for name in names]):
+        for finished in pool.each(_build_one, [(name, out, root, edition) for name in names]):
             name = names[finished.number]
             lost = f"{name}: the process that built it {finished.died}"
             died = [Diagnostic("build-process-died", lost)] if finished.died else []
@@ -164,28 +185,39 @@ def _built(
                 due += 1
 
 
-def _build_one(name: str, out: Path, root: Path) -> list[Diagnostic]:
+def _build_one(name: str, out: Path, root: Path, edition: Edition) -> list[Diagnostic]:
     """Build a component in a worker process and return its errors."""
     with contextlib.redirect_stdout(sys.stderr):  # components may print while they are imported
-        return errors_of(_recipes(root)[name], out, root)
+        return errors_of(_recipes(root)[name], out, root, edition)
 
 
 _recipes = functools.cache(find_recipes)
 """`find_recipes`, cached in each worker process."""
 
 
-def errors_of(recipe: Recipe, out: Path, root: Path) -> list[Diagnostic]:
+def errors_of(recipe: Recipe, out: Path, root: Path, edition: Edition = PLAIN) -> list[Diagnostic]:
     """Build a component and return its errors."""
     try:
-        bring_up_to_date(recipe, out / f"{recipe.name}.fmu", component_stamp(recipe, root), force=True)
+        stamp = component_stamp(recipe, root, edition)
+        bring_up_to_date(recipe, out / f"{recipe.name}.fmu", stamp, force=True)
     except BuildError as error:
         return error.diagnostics
     return []
 
 
-def component_stamp(recipe: Recipe, root: Path = COMPONENTS) -> BuildStamp:
+def component_stamp(recipe: Recipe, root: Path = COMPONENTS, edition: Edition = PLAIN) -> BuildStamp:
     """Return the stamp of a component of the project, without its key."""
-    return BuildStamp(recipe.name, key="", source=f"components/{recipe.source.relative_to(root).as_posix()}")
+    source = f"components/{recipe.source.relative_to(root).as_posix()}"
+    return BuildStamp(recipe.name, key="", source=source, edition=edition)
+
+
+def has_native_library(fmu: Path, platform: Platform) -> bool:
+    """Return whether an FMU built here has a native library for a platform."""
+    with zipfile.ZipFile(fmu) as archive:
+        library = f"{fmu.stem}{platform.suffix}"
+        folders = (platform.name, platform.folder)
+        found = [path for f in folders if (path := f"binaries/{f}/{library}") in archive.namelist()]
+        return any(archive.read(path) not in python_libraries() for path in found)
 
 
 def build_component(
@@ -197,6 +229,7 @@ def build_component(
     defaults: Mapping[str, Any] | None = None,
     force: bool = False,
     root: Path = COMPONENTS,
+    edition: Edition = PLAIN,
 ) -> Path:
     """Build a component into `out` and return the FMU.
 
@@ -209,6 +242,7 @@ def build_component(
         name: name of the FMU; default `<role>_<file>`.
         defaults: other default values of parameters.
         root: the folder `components`.
+        edition: version of FMI and contents.
     """
     source = source.resolve()
     recipe = recipe_of(source, role=role, name=name, defaults=defaults, root=root)
@@ -220,6 +254,7 @@ def build_component(
         home=target.parent.resolve().name,
         role=recipe.module[0] if isinstance(recipe, PythonRecipe) else "",
         defaults=dict(defaults or {}),
+        edition=edition,
     )
     bring_up_to_date(recipe, target, stamp, force)
     return target
@@ -271,17 +306,22 @@ def bring_up_to_date(
 ) -> bool:
     """Build an FMU unless it is current; return whether it was built. `stamp` comes without its key.
 
-    With `hurry`, a native library that takes long to build is postponed, and the stamp records that.
+    What the present FMU has beyond the wanted edition is kept. With `hurry`, a native library that takes long
+    to build is postponed, and the stamp records that.
 
     Raises:
         BuildError: each problem begins with the FMU's name.
     """
     try:
         stamp = replace(stamp, key=recipe.key(), tool=TOOL)
-        if not force and read_stamp(target) == stamp:
+        present = read_stamp(target)
+        if not force and _suffices(present, stamp, hurry=hurry):
             return False
-        files, modules = recipe.make(hurry=hurry)
-        if files.get(REASON) == LATER.encode():
+        if present is not None and not force:
+            stamp = replace(stamp, edition=stamp.edition | present.edition)
+        made = recipe.make(hurry=hurry and stamp.edition.fmi == 2, edition=stamp.edition)
+        files, modules = made.files, made.modules
+        if made.later:
             stamp = stamp.unfinished()
         credits = CREDITS if stamp.is_component else {}
         if stamp.is_component:
@@ -290,7 +330,7 @@ def bring_up_to_date(
                 reference = reference_files(draft, *modules)
             files |= {path: text.encode() for path, text in reference.items()}
         files = presented(files, recipe.listing(), role=recipe.role, credits=credits)
-        put(target, to_bytes(files, stamp), *modules)
+        put(target, to_bytes(to_fmi3(files) if stamp.edition.fmi == 3 else files, stamp), *modules)
     except BuildError as error:
         raise BuildError([
             replace(diagnostic, message=f"{recipe.name}: {diagnostic.message}")

@@ -16,6 +16,30 @@ _UNFINISHED = "-unfinished"
 
 
 @dataclass(frozen=True)
+class Edition:
+    """Form in which an FMU is built.
+
+    Attributes:
+        fmi: major version of FMI: 2, or 3 for components with native libraries.
+        platforms: names of platforms of further native libraries (`compiler.PLATFORMS`).
+        sources: whether it contains its sources in C.
+    """
+
+    fmi: int = 2
+    platforms: tuple[str, ...] = ()
+    sources: bool = False
+
+    def __or__(self, other: Edition) -> Edition:
+        """Return the form that has what either has; the version of FMI is the first's."""
+        platforms = tuple(sorted({*self.platforms, *other.platforms}))
+        return Edition(self.fmi, platforms, self.sources or other.sources)
+
+
+PLAIN = Edition()
+"""FMI 2.0, for this machine."""
+
+
+@dataclass(frozen=True)
 class BuildStamp:
     """Origin of an FMU, and the key of everything that determines its content."""
 
@@ -26,6 +50,7 @@ class BuildStamp:
     home: str = ""  # for files: name of the FMU's folder; copies in other folders are not touched
     role: str = ""  # for files: folder of the role
     defaults: Mapping[str, Any] = field(default_factory=dict)  # default values that replace the source's
+    edition: Edition = PLAIN
 
     @property
     def is_component(self) -> bool:
@@ -48,6 +73,10 @@ class BuildStamp:
     def to_comment(self) -> bytes:
         """Return the stamp as the comment of an archive."""
         content = {key: value for key, value in asdict(self).items() if value}
+        plain = asdict(PLAIN)
+        content["edition"] = {key: v for key, v in content["edition"].items() if v != plain[key]}
+        if not content["edition"]:
+            del content["edition"]
         return _SIGN + json.dumps(content, sort_keys=True).encode()
 
 
@@ -62,6 +91,9 @@ def read_stamp(fmu: Path) -> BuildStamp | None:
     if not comment.startswith(_SIGN):
         return None
     try:
-        return BuildStamp(**json.loads(comment[len(_SIGN) :]))
+        content = json.loads(comment[len(_SIGN) :])
+        edition = content.pop("edition", {})
+        edition["platforms"] = tuple(edition.get("platforms", ()))
+        return BuildStamp(**content, edition=Edition(**edition))
     except (ValueError, TypeError):  # written by another version of this program
         return BuildStamp(fmu.stem, "", "")

@@ -1,4 +1,4 @@
-/* Calling sequence of FMI 2.0, and the time of an instance, for the launcher, native libraries and components
+/* Calling sequence of FMI 2.0 and 3.0, and the time of an instance, for the launcher, native libraries and components
  * in C. A refused call does not change the instance. */
 #ifndef YAWBENCH_CALLING_SEQUENCE_H
 #define YAWBENCH_CALLING_SEQUENCE_H
@@ -20,7 +20,7 @@ typedef struct {
 } Progress;
 
 typedef struct {
-    char text[160];
+    char text[192];
 } Refusal;
 
 /* Tolerance for the times of hosts, which compute them by sums, products or from integer nanoseconds. A hundredth
@@ -33,15 +33,16 @@ static inline double time_tolerance(const Progress *at, double h)
 static inline int not_allowed(const Progress *at, const char *call, Refusal *why)
 {
     static const char *const when[] = {"before initialization", "during initialization", "after initialization",
-                                       "after fmi2Terminate"};
+                                       "after it was terminated"};
     snprintf(why->text, sizeof why->text, "%s is not allowed %s", call, when[at->phase]);
     return 0;
 }
 
-/* Write a refusal with one or two numbers, with a decimal point in every locale. */
-static inline int refuse_times(Refusal *why, const char *format, double x, double y)
+/* Write a refusal of a call with one or two numbers, with a decimal point in every locale. */
+static inline int refuse_times(Refusal *why, const char *call, const char *format, double x, double y)
 {
-    snprintf(why->text, sizeof why->text, format, x, y);
+    int length = snprintf(why->text, sizeof why->text, "%s", call);
+    snprintf(why->text + length, sizeof why->text - (size_t)length, format, x, y);
     for (char *c = why->text; *c != '\0'; c++) {
         if (*c == ',') {
             *c = '.';
@@ -60,45 +61,44 @@ static inline int pass_on(Progress *at, int from, int to, const char *call, Refu
     return 1;
 }
 
-static inline int set_up(Progress *at, double start, int stop_defined, double stop, Refusal *why)
+static inline int set_up(Progress *at, const char *call, double start, int stop_defined, double stop, Refusal *why)
 {
     if (at->phase != BEFORE_INITIALIZATION) {
-        return not_allowed(at, "fmi2SetupExperiment", why);
+        return not_allowed(at, call, why);
     }
     if (!(fabs(start) <= LATEST_START)) {
-        return refuse_times(why, "fmi2SetupExperiment: the start time must be within %.9g s of 0 (got %.9g s)",
-                            LATEST_START, start);
+        return refuse_times(why, call, ": the start time must be within %.9g s of 0 (got %.9g s)", LATEST_START,
+                            start);
     }
     at->time = start, at->stop_defined = stop_defined != 0, at->stop = stop;
     return 1;
 }
 
 /* Hosts also terminate instances that failed in initialization. */
-static inline int terminate(Progress *at, Refusal *why)
+static inline int terminate(Progress *at, const char *call, Refusal *why)
 {
     if (at->phase == AFTER_TERMINATE) {
-        return not_allowed(at, "fmi2Terminate", why);
+        return not_allowed(at, call, why);
     }
     at->phase = AFTER_TERMINATE;
     return 1;
 }
 
 /* 1 if the instance may step from t to t + h [s], 0 with the reason if not. */
-static inline int may_step(const Progress *at, double t, double h, Refusal *why)
+static inline int may_step(const Progress *at, const char *call, double t, double h, Refusal *why)
 {
     if (at->phase != AFTER_INITIALIZATION) {
-        return not_allowed(at, "fmi2DoStep", why);
+        return not_allowed(at, call, why);
     }
     if (!(h > 0.0 && h <= LONGEST_STEP)) {
-        return refuse_times(why, "fmi2DoStep: the step must be positive and at most %.9g s (got %.9g s)",
-                            LONGEST_STEP, h);
+        return refuse_times(why, call, ": the step must be positive and at most %.9g s (got %.9g s)", LONGEST_STEP, h);
     }
     double tolerance = time_tolerance(at, h);
     if (!(fabs(t - at->time) <= tolerance)) {
-        return refuse_times(why, "fmi2DoStep at t = %.9g s: the instance has reached t = %.9g s", t, at->time);
+        return refuse_times(why, call, " at t = %.9g s: the instance has reached t = %.9g s", t, at->time);
     }
     if (at->stop_defined && t + h > at->stop + tolerance) {
-        return refuse_times(why, "fmi2DoStep to t = %.9g s: the stop time is %.9g s", t + h, at->stop);
+        return refuse_times(why, call, " to t = %.9g s: the stop time is %.9g s", t + h, at->stop);
     }
     return 1;
 }

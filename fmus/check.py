@@ -92,19 +92,22 @@ def _load(description: Any, folder: str) -> list[str]:
 
     wrong: list[str] = []
     try:
+        modern = description.fmiVersion != "2.0"
         instance = instantiate_fmu(folder, description, "CoSimulation", logger=log)
-        instance.setupExperiment()
-        getters: dict[str, tuple[Callable[..., Any], Callable[..., Any]]] = {
-            "Real": (instance.getReal, float),
-            "Integer": (instance.getInteger, int),
-            "Boolean": (instance.getBoolean, lambda text: text == "true"),
-            "String": (lambda vr: [text.decode() for text in instance.getString(vr)], str),
+        if not modern:
+            instance.setupExperiment()
+        convert: dict[str, Callable[[str], Any]] = {
+            "Boolean": lambda text: text == "true",
+            "String": str,
+            "Real": float,
+            "Float64": float,
         }
+        names = {"Enumeration": "Int64" if modern else "Integer"}
         for v in description.modelVariables:
             if v.causality == "parameter":
-                getter, convert = getters[v.type]
-                value = getter([v.valueReference])[0]
-                if value != convert(v.start):
+                value = getattr(instance, f"get{names.get(v.type, v.type)}")([v.valueReference])[0]
+                value = value.decode() if isinstance(value, bytes) else value
+                if value != convert.get(v.type, int)(v.start):
                     wrong.append(f"parameter {v.name} is {value!r}, but {v.start} in its model description")
         instance.freeInstance()
     except Exception as error:

@@ -43,6 +43,8 @@ _REFUSED = {
     "Binary": "is Binary, which is not supported",
     "Clock": "is a Clock, which is not supported",
 }
+ANNOTATION = "org.yawbench"
+"""Type of yawbench's own annotations in FMI 3.0."""
 MOST = 100_000
 """Largest number of elements of an array; chosen: more than any interface has."""
 
@@ -65,17 +67,19 @@ def scalars(description: Any, root: ElementTree.Element) -> tuple[dict[str, Vari
             refused[v.name] = why
             continue
         declared = v.declaredType
-        kind = _KINDS.get(v.type, v.type)
-        unit = v.unit or (declared.unit if declared else None)
         extra = _annotation(element)
         choices = tuple(extra["choices"].split(", ")) if "choices" in extra else ()
+        kind: Any = "String" if v.type == "Enumeration" and choices else _KINDS.get(v.type, v.type)
+        unit = v.unit or (declared.unit if declared else None)
         items = (
             {i.name: int(i.value) for i in declared.items} if v.type == "Enumeration" and declared else None
         )
         names = element_names(v.name, v.shape or ())
         driven = v.causality == "input" and v.alias
         aliases = element_names(v.alias.name, v.shape or ()) if driven else [None] * len(names)
-        starts = _starts(v, kind, element, len(names))
+        starts = _starts(v, "Integer" if kind == "String" and items else kind, element, len(names))
+        if kind == "String" and items:
+            starts = [next((name for name, n in items.items() if n == start), None) for start in starts]
         limits = element if modern else v  # fmpy does not read the limits of all FMI 3.0 types
         for i, name in enumerate(names):
             variables.setdefault(
@@ -97,7 +101,7 @@ def scalars(description: Any, root: ElementTree.Element) -> tuple[dict[str, Vari
                     optional=v.causality == "input" and "optional" in extra,
                     source=extra.get("source", ""),
                     definition=definitions.get(unit),
-                    encoding=("Int64" if kind == "Enumeration" else v.type) if modern else None,
+                    encoding=("Int64" if v.type == "Enumeration" else v.type) if modern else None,
                     element=i,
                     elements=len(names),
                     alias_of=aliases[i],
@@ -152,8 +156,15 @@ def _definitions(description: Any) -> dict[str | None, UnitDefinition]:
 
 def _annotation(element: ElementTree.Element) -> dict[str, str]:
     """Return yawbench's own annotation of a variable: optional, choices, source."""
-    annotation = element.find("Annotations/Tool[@name='yawbench']/variable")
+    annotation = _own(element.find("Annotations"), "variable")
     return {} if annotation is None else annotation.attrib
+
+
+def _own(annotations: ElementTree.Element | None, tag: str) -> ElementTree.Element | None:
+    """Return an element of yawbench's own annotation, where FMI 2.0 or 3.0 has it."""
+    places = (f"Tool[@name='yawbench']/{tag}", f"Annotation[@type='{ANNOTATION}']/{tag}")
+    found = [e for place in places if annotations is not None and (e := annotations.find(place)) is not None]
+    return found[0] if found else None
 
 
 def _starts(v: Any, kind: str, element: ElementTree.Element, count: int) -> list[Value | None]:
@@ -330,7 +341,7 @@ def _dangling(root: ElementTree.Element, fmi: int) -> str | None:
 
 def _annotated(root: ElementTree.Element, tag: str, key: str) -> str:
     """Return an attribute of yawbench's own annotation of an FMU, "" if there is none."""
-    element = root.find(f"VendorAnnotations/Tool[@name='yawbench']/{tag}")
+    element = _own(root.find("VendorAnnotations" if root.get("fmiVersion") == "2.0" else "Annotations"), tag)
     return "" if element is None else element.get(key, "")
 
 

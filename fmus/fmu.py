@@ -63,7 +63,9 @@ class Variable:
     description: str
     depends_on: tuple[str, ...] | None = None  # of an output: inputs with feedthrough; None: not declared
     choices: tuple[str, ...] | None = None  # of a String: allowed values, if the description lists them
-    items: dict[str, int] | None = None  # of an Enumeration: name -> value
+    items: dict[str, int] | None = (
+        None  # of an Enumeration, and of a text that is one in the FMU: name -> value
+    )
     optional: bool = False  # of an input: its start value may be used if nothing drives it
     source: str = ""  # of a parameter: where its start value comes from, if the FMU says so
     definition: UnitDefinition | None = None  # of `unit`, if the description gives one
@@ -76,8 +78,17 @@ class Variable:
     @cached_property
     def ref(self) -> ValueRef:
         """Its reference in the FMU. The functions of FMI 2.0 treat an enumeration as an Integer."""
-        kind = self.encoding or {"Enumeration": "Integer"}.get(self.type, self.type)
+        kind = self.encoding or ("Integer" if self.items is not None else self.type)
         return ValueRef(kind, self.reference, self.element, self.elements)
+
+    @property
+    def fmi_type(self) -> str:
+        """Its type in the FMU, by the names of FMI 2.0: choices of this project's units are Enumerations."""
+        return "Enumeration" if self.items is not None else self.type
+
+    def encoded(self, value: Value) -> Value:
+        """Return a value as the FMU's functions take it."""
+        return self.items[value] if isinstance(value, str) and self.items is not None else value
 
     @property
     def discrete(self) -> bool:

@@ -444,7 +444,7 @@ EXPORT fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean tolerance_def
                                       fmi2Real start, fmi2Boolean stop_defined, fmi2Real stop)
 {
     INSTANCE(c)
-    ALLOWED(set_up(&in->at, start, stop_defined, stop, &why))
+    ALLOWED(set_up(&in->at, "fmi2SetupExperiment", start, stop_defined, stop, &why))
     return checked(
         in, library.SetupExperiment(in->stock, tolerance_defined, tolerance, start, stop_defined, stop));
 }
@@ -466,7 +466,7 @@ EXPORT fmi2Status fmi2ExitInitializationMode(fmi2Component c)
 EXPORT fmi2Status fmi2Terminate(fmi2Component c)
 {
     INSTANCE(c)
-    ALLOWED(terminate(&in->at, &why))
+    ALLOWED(terminate(&in->at, "fmi2Terminate", &why))
     return checked(in, library.Terminate(in->stock));
 }
 
@@ -675,7 +675,7 @@ EXPORT fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[
 EXPORT fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolean no_set_state_prior)
 {
     INSTANCE(c)
-    ALLOWED(in->at.failed || may_step(&in->at, t, h, &why))
+    ALLOWED(in->at.failed || may_step(&in->at, "fmi2DoStep", t, h, &why))
     fmi2Status status = checked(in, library.DoStep(in->stock, t, h, no_set_state_prior));
     if (status <= fmi2Warning) {
         in->at.time = t + h;

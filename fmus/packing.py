@@ -12,6 +12,7 @@ import io
 import uuid
 import zipfile
 from collections.abc import Mapping
+from functools import cache
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
@@ -24,6 +25,12 @@ LIBRARIES = sorted(PYTHONFMU.glob("resources/binaries/*/*"))
 """PythonFMU's libraries, in a folder per platform."""
 PYTHONFMU_LIBRARY = "libpythonfmu-export.so"
 """Name of PythonFMU's library next to the launcher, which opens it by this name."""
+
+
+@cache
+def python_libraries() -> frozenset[bytes]:
+    """Return the contents of PythonFMU's libraries, which need a Python."""
+    return frozenset(library.read_bytes() for library in LIBRARIES)
 
 
 def pack(

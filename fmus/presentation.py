@@ -19,6 +19,8 @@ from jinja2 import Environment, Template
 
 from .packing import DESCRIPTION
 from .reference_result import FOLDER
+from .source_archive import list_sources
+from .usual_ranges import usual_range
 
 DATE = "2026-11-22T00:00:00Z"
 """Date of this version of the program; the time of the build would make FMUs irreproducible."""
@@ -51,6 +53,8 @@ def presented(
         if key in generated or not root.get(key):
             root.set(key, value)
     _declare_role(root, role)
+    list_sources(root, files)
+    _declare_nominals(root)
     shown = {
         DESCRIPTION: ElementTree.tostring(root, encoding="UTF-8", xml_declaration=True) + b"\n",
         "documentation/index.html": _page(root, sources, files).encode(),
@@ -67,6 +71,16 @@ def _declare_role(root: Element, role: str) -> None:
         annotations = Element("VendorAnnotations")
         root.insert([child.tag for child in root].index("ModelVariables"), annotations)
     SubElement(SubElement(annotations, "Tool", name="yawbench"), "role", name=role)
+
+
+def _declare_nominals(root: Element) -> None:
+    """Add the magnitudes of signals to a model description, where they are known and not 1."""
+    for variable in root.iterfind("ModelVariables/ScalarVariable"):
+        real = variable.find("Real")
+        if real is not None and variable.get("causality") != "parameter" and real.get("nominal") is None:
+            nominal = max(map(abs, usual_range(variable.get("name", ""))))
+            if nominal != 1.0:
+                real.set("nominal", repr(nominal))
 
 
 def icon(role: str) -> list[Path]:
@@ -129,8 +143,12 @@ def _variables(root: Element) -> Iterator[dict[str, str]]:
     }
     for variable, name in zip(variables, names, strict=True):
         annotation = variable.find("Annotations/Tool[@name='yawbench']/variable")
+        choices = [] if annotation is None else annotation.get("choices", "").split(", ")
+        start = variable[0].get("start")
+        chosen = {"start": choices[int(start) - 1]} if variable[0].tag == "Enumeration" and start else {}
         yield {
             **variable[0].attrib,
+            **chosen,
             **variable.attrib,
             "meaning": variable.get("description", ""),
             "depends directly on": follows.get(name, ""),

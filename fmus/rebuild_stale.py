@@ -111,18 +111,19 @@ class FmuUpdater:
         return recipe_of(source, role=stamp.role or None, name=stamp.name, defaults=stamp.defaults)
 
     def _build(self, archive: Path, stamp: BuildStamp) -> tuple[Path, BuildInfo]:
+        from .archive import runs_as
         from .build import bring_up_to_date, component_stamp
-        from .native.build import LATER
 
         target = build_folder(archive.parent) / archive.name
         recipe = self._recipe(archive, stamp)
         assert recipe is not None
         if stamp.is_component:
-            stamp = component_stamp(recipe)
+            stamp = component_stamp(recipe, edition=stamp.edition)
         bring_up_to_date(recipe, target, stamp, hurry=True)
         built = read_stamp(target)
         assert built is not None
-        later = f"; it runs in Python: {LATER}" if built.is_unfinished else ""
+        how = runs_as(target)
+        later = f"; it runs in Python: {how.why}" if built.is_unfinished and how and how.why else ""
         self._report(f"{recipe.name}: built{later}")
         return target, _built(built, current=True)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import shutil
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache, cached_property
@@ -15,8 +16,9 @@ from yawbench.foundation.errors import BuildError
 from yawbench.vocabulary.roles import ROLES
 
 from .archive import REASON, UNTRIED
-from .compiler import compile_launcher, compiler_tools
-from .native.build import HEADERS, native, toolchain, tools
+from .build_stamp import PLAIN, Edition
+from .compiler import MINGW, OWN, PLATFORMS, TO_WINDOWS, Platform, compile_launcher, launcher_sources
+from .native.build import HEADERS, native, toolchain
 from .packing import LIBRARIES, pack
 from .presentation import PAGE, icon
 from .source_digests import SourceDigests
@@ -25,6 +27,30 @@ from .staging import entry_module, missing_signals, staged, variant
 
 TOOL = f"yawbench {version('yawbench')}, pythonfmu {version('pythonfmu')}"
 HERE = Path(__file__).resolve().parent
+
+
+@dataclass(frozen=True)
+class Made:
+    """Files of an archive, as a recipe makes them.
+
+    Attributes:
+        files: path in the archive -> content.
+        modules: names of the Python modules among them.
+        later: whether another build may add native libraries.
+    """
+
+    files: dict[str, bytes]
+    modules: tuple[str, ...] = ()
+    later: bool = False
+
+
+def wanted_platforms(edition: Edition) -> list[Platform]:
+    """Return the platforms other than this for which native libraries are compiled.
+
+    Windows is among them where MinGW is installed, which takes a second; Zig takes many, for each platform.
+    """
+    names = {*edition.platforms} | ({TO_WINDOWS.name} if shutil.which(MINGW) else set())
+    return [PLATFORMS[name] for name in PLATFORMS if name in names and PLATFORMS[name] != OWN]
 
 
 @dataclass(frozen=True)
@@ -56,7 +82,7 @@ class PythonRecipe:
     def key(self) -> str:
         """Return a hash of everything that determines the content of the FMU."""
         parts = [self.name, ".".join(self.module), json.dumps(dict(self.defaults)), _builder(self.role)]
-        parts += [toolchain(), hashlib.sha256(compile_launcher()[0] or b"").hexdigest(), _hash(self._files)]
+        parts += [toolchain(), hashlib.sha256(launcher_sources()).hexdigest(), _hash(self._files)]
         return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:32]
 
     def evidence(self) -> dict[str, str]:
@@ -70,15 +96,13 @@ class PythonRecipe:
                 *icon(self.role),
                 *translator,
                 *libraries,
-                *tools(),
-                *compiler_tools(),
             ]
         )
 
-    def make(self, *, hurry: bool = False) -> tuple[dict[str, bytes], tuple[str, ...]]:
-        """Return the files of the archive, and the names of the Python modules among them.
+    def make(self, *, hurry: bool = False, edition: Edition = PLAIN) -> Made:
+        """Return the files of the archive, of FMI 2.0 whatever the edition.
 
-        With `hurry`, a native library that takes long to build is postponed.
+        With `hurry`, a native library that takes long to build is postponed, and so are other platforms.
         """
         module, files = self.module, self._files
         if self.defaults or self.name != natural_name(module):
@@ -107,12 +131,15 @@ class PythonRecipe:
                 resources=stage.folder,
                 read=stage.read,
                 hurry=hurry,
+                others_too=() if hurry else wanted_platforms(edition),
+                with_sources=edition.sources,
             )
         packed |= library.files
         packed[REASON] = library.why_not.encode()
         if library.untried:
             packed[UNTRIED] = "".join(f"{place}\n" for place in library.untried).encode()
-        return packed, (package, entry)
+        later = library.later or (hurry and bool(edition.platforms))
+        return Made(packed, (package, entry), later=later or launcher is None)
 
 
 def natural_name(module: Parts) -> str:

@@ -32,6 +32,7 @@ _PLAIN_PATH = re.compile(r"[A-Za-z0-9_.~/\\: -]+")
 STORES = {
     "launcher": "launchers",
     "native": "native libraries",
+    "compiled": "libraries for other platforms",
     "step_loop": "step loops",
     "rows_text": "writers of CSV",
     "keys": "keys of sources",

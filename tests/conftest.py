@@ -19,8 +19,8 @@ import pytest
 from tests.command_line import status_of
 from tests.fmu_copies import put_fmus
 from tests.reports import browser as browsers
+from yawbench.fmus import recipe
 from yawbench.fmus.build import build_component
-from yawbench.fmus.c import c_recipe
 from yawbench.foundation.workers import default_workers
 
 TESTS = Path(__file__).parent
@@ -126,7 +126,7 @@ def common_cache(unpacked: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 def build_here(source: Path, folder: Path) -> Path:
     """Build a component in C without its library for Windows, which takes as long as that for Linux."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(c_recipe, "TO_WINDOWS", "no-compiler-for-windows")
+        patch.setattr(recipe, "MINGW", "no-compiler-for-windows")
         return build_component(source, folder)
 
 

@@ -64,3 +64,12 @@ SHOWN: dict[str, tuple[str, float]] = {
     "%": ("%", 100.0),
 }
 """Unit -> displayed unit and conversion factor; `%` marks a ratio in per cent."""
+
+DISPLAYED: dict[str, tuple[str, float]] = {
+    "rad": ("deg", 180 / math.pi),
+    "rad/s": ("deg/s", 180 / math.pi),
+    "rad/s2": ("deg/s2", 180 / math.pi),
+    "m/s": ("km/h", 3.6),
+    "Pa": ("bar", 1e-5),
+}
+"""Unit -> displayed unit and conversion factor in model descriptions, whose readers may know ASCII only."""

@@ -17,7 +17,8 @@ from typing import Any
 from yawbench.components.fmi.component import Component
 from yawbench.fmus.archive import runs_as
 from yawbench.fmus.build import COMPONENTS, put
-from yawbench.fmus.build_stamp import BuildStamp
+from yawbench.fmus.build_stamp import BuildStamp, Edition
+from yawbench.fmus.fmi3_archive import to_fmi3
 from yawbench.fmus.native.compare_with_python import Twin, random_inputs
 from yawbench.fmus.packing import to_bytes
 from yawbench.fmus.presentation import presented
@@ -40,7 +41,9 @@ NOWHERE = "/"
 """Not a valid folder name, so that an exported FMU is never stale: its program may be gone."""
 
 
-def export_fmu(controller: ControllerLike, file: str | Path, *, role: str = "controller") -> Path:
+def export_fmu(
+    controller: ControllerLike, file: str | Path, *, role: str = "controller", fmi: int = 2
+) -> Path:
     """Write a controller in plain Python as an FMU, and return its path.
 
         >>> def follow(yaw_rate_ref, yaw_rate, gain=2e4):
@@ -52,18 +55,21 @@ def export_fmu(controller: ControllerLike, file: str | Path, *, role: str = "con
 
     A `YawbenchWarning` names branches of its native library that were never compared with Python.
 
-    The FMU is FMI 2.0 for co-simulation, with a native library where the program can be translated. It has
-    the program's parameters, and contains the modules of the user's own package that it imports. Before it
-    is written, its outputs are compared with those of the program, bit by bit.
+    The FMU is for co-simulation, with a native library where the program can be translated. It has the
+    program's parameters. One of FMI 2.0 contains the modules of the user's own package that it imports; one
+    of FMI 3.0 is native only. Before it is written, its outputs are compared with those of the program, bit
+    for bit.
 
     Args:
         controller: plain Python as in `Scenario.swap`.
         file: the FMU; its name without `.fmu` is the name of the model.
         role: role of its instances, such as "driver"; it determines the outputs of a function.
+        fmi: version of FMI, 2 or 3.
 
     Raises:
-        ScenarioError: the controller or the role is invalid.
-        BuildError: the program needs something that an FMU cannot contain.
+        ScenarioError: the controller, the role or the version is invalid.
+        BuildError: the program needs something that an FMU cannot contain, or cannot be translated for
+            FMI 3.0.
     """
     path = arguments.path(file, "file").absolute()
     role = arguments.text(role, "role")
@@ -79,21 +85,25 @@ def export_fmu(controller: ControllerLike, file: str | Path, *, role: str = "con
         )
     if arguments.names_file(controller):
         raise ScenarioError(f"controller: {short(controller)} is an FMU already", code="controller-invalid")
+    if fmi not in (2, 3):
+        raise ScenarioError(f"fmi: must be 2 or 3 (got {short(fmi)})", code="argument-invalid")
     with bar(f"Export {path.name}"):
-        _write(controller, path, role, folders[role])
+        _write(controller, path, role, folders[role], Edition(fmi))
     return path
 
 
-def _write(controller: Any, path: Path, role: str, folder: str) -> None:
+def _write(controller: Any, path: Path, role: str, folder: str, edition: Edition) -> None:
     """Write the FMU of a program."""
     program = PythonComponent(controller, instance=role, role=role)
     try:
         recipe = _recipe(controller, program, path.stem, folder)
-        files, modules = recipe.make()
-        files = presented(files, recipe.listing(), role=role, credits={})
+        made = recipe.make(edition=edition)
+        files = presented(made.files, recipe.listing(), role=role, credits={})
+        if edition.fmi == 3:
+            files = to_fmi3(files)
         key = hashlib.sha256(b"".join(files[name] for name in sorted(files))).hexdigest()[:32]
-        stamp = BuildStamp(path.stem, key, source="Python", tool=TOOL, home=NOWHERE)
-        put(path, to_bytes(files, stamp), *modules)
+        stamp = BuildStamp(path.stem, key, source="Python", tool=TOOL, home=NOWHERE, edition=edition)
+        put(path, to_bytes(files, stamp), *made.modules)
         if (how := runs_as(path)) and how.note:
             warnings.warn(f"{path.name}: {how.note}", YawbenchWarning, stacklevel=4)
     except BuildError as error:
@@ -339,10 +349,10 @@ def _settings(variables: Sequence[Any]) -> Iterator[tuple[str, str, list[int], l
     for i, v in enumerate(variables):
         if v.causality != "parameter":
             continue
-        values = (v.choices or ()) if v.type == "String" else (other[v.type](v.start),)
+        values = range(1, 1 + len(v.choices)) if v.choices else (other[v.type](v.start),)
         for value in values:
             if v.maximum is None or v.type != "Real" or value <= v.maximum:
-                yield f"with {v.name} = {value!r}", v.type, [i], [value], FEW
+                yield f"with {v.name} = {value!r}", v.fmi_type, [i], [value], FEW
 
 
 def _outputs(

@@ -35,13 +35,23 @@ class DeadBandParameters:
         0.1, "1", "Share of the reference that widens the dead band", "chosen: model error", minimum=0.0
     )
     yaw_rate_gain: float = parameter(
-        40000.0, "N.m.s/rad", "Gain k_r beyond the dead band", "chosen: the limit at 7 deg/s", minimum=0.0
+        40000.0,
+        "N.m.s/rad",
+        "Gain k_r beyond the dead band",
+        "chosen: the limit at 7 deg/s",
+        minimum=0.0,
+        tunable=True,
     )
     understeer_share: float = parameter(
         0.5, "1", "Share of the gain against understeer", "chosen: half", minimum=0.0, maximum=1.0
     )
     sideslip_gain: float = parameter(
-        60000.0, "N.m/rad", "Gain k_beta beyond the limit", "chosen: the limit at 5 degrees", minimum=0.0
+        60000.0,
+        "N.m/rad",
+        "Gain k_beta beyond the limit",
+        "chosen: the limit at 5 degrees",
+        minimum=0.0,
+        tunable=True,
     )
     moment_limit: float = like(LimitParameters, "moment_limit")
     release_speed: float = parameter(

@@ -60,22 +60,34 @@ class FnnParameters:
     """Parameters of network, learning and moment limit."""
 
     error_gain: float = parameter(
-        400.0, "1/rad", "Scale theta_1 of e", "chosen: at 0.16 degrees x_1 is 1/2", minimum=0.0
+        400.0, "1/rad", "Scale theta_1 of e", "chosen: at 0.16 degrees x_1 is 1/2", minimum=0.0, tunable=True
     )
     error_rate_gain: float = parameter(
-        50.0, "s/rad", "Scale theta_2 of de/dt", "chosen: damps the loop up to 5 ms sample time", minimum=0.0
+        50.0,
+        "s/rad",
+        "Scale theta_2 of de/dt",
+        "chosen: damps the loop up to 5 ms sample time",
+        minimum=0.0,
+        tunable=True,
     )
     set_width: float = parameter(
         0.24, "1", "Width s of the sets before learning", "chosen: sets cross at 0.6", minimum=NARROWEST
     )
     moment_gain: float = parameter(
-        5000.0, "N.m", "Moment K_u per unit of the network's output", "chosen: the moment limit", minimum=0.0
+        5000.0,
+        "N.m",
+        "Moment K_u per unit of the network's output",
+        "chosen: the moment limit",
+        minimum=0.0,
+        tunable=True,
     )
     moment_limit: float = parameter(
         5000.0, "N.m", "Largest moment", "chosen: slightly more than the motors can give", minimum=0.0
     )
     learning: bool = parameter(True, None, "Learn online; false freezes the weights", "paper A")
-    learning_rate: float = parameter(2.0, "1", "Learning rate alpha", "paper A, equation (35)", minimum=0.0)
+    learning_rate: float = parameter(
+        2.0, "1", "Learning rate alpha", "paper A, equation (35)", minimum=0.0, tunable=True
+    )
     plant_jacobian: float = parameter(
         5.5e-4, "1", "Constant J in place of de/dM_z", "paper A, equation (32), positive constant"
     )

@@ -43,16 +43,24 @@ class FuzzyFeedbackParameters:
     yaw_rate_error_rate_factor: float = parameter(
         0.02, "s2/rad", "k_c of the yaw-rate system", "chosen: saturates at 50 rad/s2", minimum=0.0
     )
-    yaw_rate_moment: float = parameter(8000.0, "N.m", "k_u of the yaw-rate system", "chosen", minimum=0.0)
-    yaw_rate_weight: float = parameter(1.0, "1", "Weight W_1 of the yaw-rate system", "chosen", minimum=0.0)
+    yaw_rate_moment: float = parameter(
+        8000.0, "N.m", "k_u of the yaw-rate system", "chosen", minimum=0.0, tunable=True
+    )
+    yaw_rate_weight: float = parameter(
+        1.0, "1", "Weight W_1 of the yaw-rate system", "chosen", minimum=0.0, tunable=True
+    )
     sideslip_error_factor: float = parameter(
         10.0, "1/rad", "k_e of the sideslip system", "chosen: saturates at 0.1 rad", minimum=0.0
     )
     sideslip_error_rate_factor: float = parameter(
         0.5, "s/rad", "k_c of the sideslip system", "chosen: saturates at 2 rad/s", minimum=0.0
     )
-    sideslip_moment: float = parameter(4000.0, "N.m", "k_u of the sideslip system", "chosen", minimum=0.0)
-    sideslip_weight: float = parameter(1.0, "1", "Weight W_2 of the sideslip system", "chosen", minimum=0.0)
+    sideslip_moment: float = parameter(
+        4000.0, "N.m", "k_u of the sideslip system", "chosen", minimum=0.0, tunable=True
+    )
+    sideslip_weight: float = parameter(
+        1.0, "1", "Weight W_2 of the sideslip system", "chosen", minimum=0.0, tunable=True
+    )
     rate_filter: float = parameter(
         0.0, "s", "Time constant smoothing the rate of the yaw-rate error", "chosen: none", minimum=0.0
     )

@@ -67,21 +67,27 @@ class FuzzyPidParameters(PidParameters):
         "Range of dK_p of the yaw rate",
         "chosen: with the sideslip's, a quarter off paper C's peaks",
         minimum=0.0,
+        tunable=True,
     )
     yaw_rate_integral_range: float = parameter(
-        0.0, "N.m/rad", "Range of dK_i of the yaw rate", "chosen: none", minimum=0.0
+        0.0, "N.m/rad", "Range of dK_i of the yaw rate", "chosen: none", minimum=0.0, tunable=True
     )
     yaw_rate_derivative_range: float = parameter(
-        100.0, "N.m.s2/rad", "Range of dK_d of the yaw rate", "chosen: as K_d", minimum=0.0
+        100.0, "N.m.s2/rad", "Range of dK_d of the yaw rate", "chosen: as K_d", minimum=0.0, tunable=True
     )
     sideslip_proportional_range: float = parameter(
-        30000.0, "N.m/rad", "Range of dK_p of the sideslip", "chosen: see the yaw rate's", minimum=0.0
+        30000.0,
+        "N.m/rad",
+        "Range of dK_p of the sideslip",
+        "chosen: see the yaw rate's",
+        minimum=0.0,
+        tunable=True,
     )
     sideslip_integral_range: float = parameter(
-        0.0, "N.m/(rad.s)", "Range of dK_i of the sideslip", "chosen: none", minimum=0.0
+        0.0, "N.m/(rad.s)", "Range of dK_i of the sideslip", "chosen: none", minimum=0.0, tunable=True
     )
     sideslip_derivative_range: float = parameter(
-        100.0, "N.m.s/rad", "Range of dK_d of the sideslip", "chosen: as K_d", minimum=0.0
+        100.0, "N.m.s/rad", "Range of dK_d of the sideslip", "chosen: as K_d", minimum=0.0, tunable=True
     )
 
 

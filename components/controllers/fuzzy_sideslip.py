@@ -54,7 +54,12 @@ class FuzzySideslipParameters:
         minimum=1e-6,
     )
     moment_range: float = parameter(
-        5000.0, "N.m", "Peak of the outermost sets of M_z", "chosen: as controller_fnn", minimum=0.0
+        5000.0,
+        "N.m",
+        "Peak of the outermost sets of M_z",
+        "chosen: as controller_fnn",
+        minimum=0.0,
+        tunable=True,
     )
 
 

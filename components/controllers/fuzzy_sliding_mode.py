@@ -32,10 +32,20 @@ class FuzzySlidingModeParameters(SurfaceParameters):
     """Parameters of the law, and the ranges that the paper leaves open."""
 
     largest_reaching_rate: float = parameter(
-        3.0, "rad/s2", "Range of eps, from 0", "chosen: its middle exceeds the constant law's", minimum=1e-6
+        3.0,
+        "rad/s2",
+        "Range of eps, from 0",
+        "chosen: its middle exceeds the constant law's",
+        minimum=1e-6,
+        tunable=True,
     )
     largest_reaching_gain: float = parameter(
-        10.0, "1/s", "Range of k_d, from 0", "chosen: up to that of the constant law", minimum=1e-6
+        10.0,
+        "1/s",
+        "Range of k_d, from 0",
+        "chosen: up to that of the constant law",
+        minimum=1e-6,
+        tunable=True,
     )
     largest_steer_angle: float = parameter(
         0.09,

@@ -31,6 +31,7 @@ class LqrParameters(PaperASingleTrack):
         "Sideslip error beta_0 of cost 1",
         "chosen: small enough for a moment against the sideslip of an understeering car above 8 m/s",
         minimum=1e-6,
+        tunable=True,
     )
     yaw_rate_scale: float = parameter(
         0.2,
@@ -38,9 +39,10 @@ class LqrParameters(PaperASingleTrack):
         "Yaw-rate error r_0 of cost 1",
         "chosen: 11 degrees per second, so that actuators of 50 ms can follow",
         minimum=1e-6,
+        tunable=True,
     )
     moment_scale: float = parameter(
-        5000.0, "N.m", "Moment M_0 of cost 1", "chosen: equal to the limit", minimum=1e-3
+        5000.0, "N.m", "Moment M_0 of cost 1", "chosen: equal to the limit", minimum=1e-3, tunable=True
     )
     scheduling_speed: float = parameter(
         8.0, "m/s", "Speed below which the gains are constant", "chosen: slower cars are safe", minimum=0.1

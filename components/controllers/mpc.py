@@ -43,7 +43,12 @@ class MpcParameters(LqrParameters):
         maximum=50,
     )
     sideslip_penalty: float = parameter(
-        10.0, "1", "Weight of the excess over the sideslip bound", "chosen: ten errors", minimum=1e-6
+        10.0,
+        "1",
+        "Weight of the excess over the sideslip bound",
+        "chosen: ten errors",
+        minimum=1e-6,
+        tunable=True,
     )
 
 

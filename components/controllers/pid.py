@@ -28,6 +28,7 @@ class PidParameters:
         "K_p of the yaw rate",
         "chosen: calm, a sixth or more off paper C's sideslip peaks",
         minimum=0.0,
+        tunable=True,
     )
     yaw_rate_integral_gain: float = parameter(
         2000.0,
@@ -35,18 +36,24 @@ class PidParameters:
         "K_i of the yaw rate",
         "chosen: integral time of 4 s, slower than the runs",
         minimum=0.0,
+        tunable=True,
     )
     yaw_rate_derivative_gain: float = parameter(
-        100.0, "N.m.s2/rad", "K_d of the yaw rate", "chosen: little, cars damp their yaw", minimum=0.0
+        100.0,
+        "N.m.s2/rad",
+        "K_d of the yaw rate",
+        "chosen: little, cars damp their yaw",
+        minimum=0.0,
+        tunable=True,
     )
     sideslip_proportional_gain: float = parameter(
-        4000.0, "N.m/rad", "K_p of the sideslip", "chosen: half of the yaw rate's", minimum=0.0
+        4000.0, "N.m/rad", "K_p of the sideslip", "chosen: half of the yaw rate's", minimum=0.0, tunable=True
     )
     sideslip_integral_gain: float = parameter(
-        200.0, "N.m/(rad.s)", "K_i of the sideslip", "chosen: nearly none", minimum=0.0
+        200.0, "N.m/(rad.s)", "K_i of the sideslip", "chosen: nearly none", minimum=0.0, tunable=True
     )
     sideslip_derivative_gain: float = parameter(
-        100.0, "N.m.s/rad", "K_d of the sideslip", "chosen: as the yaw rate's", minimum=0.0
+        100.0, "N.m.s/rad", "K_d of the sideslip", "chosen: as the yaw rate's", minimum=0.0, tunable=True
     )
     derivative_filter: float = parameter(
         0.02, "s", "Time constant of the derivative filter", "chosen: a tenth of the car's own", minimum=0.0

@@ -31,9 +31,15 @@ class SlidingModeParameters(SurfaceParameters):
         "Gain eps of the switching function",
         "chosen: clear chatter with the sign",
         minimum=0.0,
+        tunable=True,
     )
     reaching_gain: float = parameter(
-        10.0, "1/s", "Gain k_d of the sliding surface", "chosen: 0.1 s time constant", minimum=0.0
+        10.0,
+        "1/s",
+        "Gain k_d of the sliding surface",
+        "chosen: 0.1 s time constant",
+        minimum=0.0,
+        tunable=True,
     )
 
 

@@ -80,6 +80,18 @@ def _unsigned(references: Sequence[int]) -> list[int]:
     return [reference % 2**32 for reference in references]
 
 
+def _to_host(variable: VariableSpec, value: Any) -> Any:
+    """Return a value as hosts see it: of an Enumeration, the number of the choice, from 1."""
+    choices = variable.choices
+    return choices.index(value) + 1 if choices is not None and value in choices else value
+
+
+def _from_host(variable: VariableSpec, value: Any) -> Any:
+    """Return what a host has set, of an Enumeration the choice; wrong numbers are refused later."""
+    choices = variable.choices
+    return choices[value - 1] if choices is not None and 1 <= value <= len(choices) else value
+
+
 class Component(Fmi2Slave):
     """A component of the test bench. The first line of a subclass's docstring describes its FMU."""
 
@@ -117,6 +129,7 @@ class Component(Fmi2Slave):
         cls._n_in = len(ins)
         cls._n_io = len(ins) + len(outs)
         cls._n_real = sum(v.type == "Real" for v in cls.variables)
+        cls._tunable = frozenset(i for i, v in enumerate(cls.variables) if v.variability == "tunable")
         cls._in_refs = list(range(cls._n_in))
         cls._out_refs = list(range(cls._n_in, cls._n_io))
         names = [v.name for v in cls.variables]
@@ -127,6 +140,7 @@ class Component(Fmi2Slave):
     _n_in: ClassVar[int] = 0
     _n_io: ClassVar[int] = 0
     _n_real: ClassVar[int] = 0
+    _tunable: ClassVar[frozenset[int]] = frozenset()
     _in_refs: ClassVar[list[int]] = []
     _out_refs: ClassVar[list[int]] = []
 
@@ -205,6 +219,8 @@ class Component(Fmi2Slave):
         if self._failed:
             return False
         try:
+            if not self._configured:
+                self._configure()
             values = self._values
             n = self._n_in
             u = values[:n]
@@ -310,7 +326,9 @@ class Component(Fmi2Slave):
             else:
                 stored = self._values
                 for vr, value in zip(vrs, values, strict=True):
-                    if not 0 <= vr < self._n_in:
+                    if vr in self._tunable:
+                        self._configured = False
+                    elif not 0 <= vr < self._n_in:
                         raise ValueError(f"{self._name_of(vr)} cannot be set after initialization")
                     stored[vr] = value
         except BaseException:
@@ -333,10 +351,8 @@ class Component(Fmi2Slave):
 
     def _get_other(self, vrs: list[int], kind: str, blank: Any) -> list[Any]:
         try:
-            for vr in vrs:
-                if not 0 <= vr < len(self.variables) or self.variables[vr].type != kind:
-                    raise TypeError(f"{self._name_of(vr)} is not of type {kind}")
-            return [self._others[vr - self._n_real] for vr in vrs]
+            self._check_kind(vrs, kind)
+            return [_to_host(self.variables[vr], self._others[vr - self._n_real]) for vr in vrs]
         except BaseException:
             self._fail(f"reading {kind} {_unsigned(vrs)} failed", self._start_time)
             return [blank] * len(vrs)
@@ -345,13 +361,20 @@ class Component(Fmi2Slave):
         try:
             if not self._initializing:
                 raise ValueError(f"{self._name_of(vrs[0])} cannot be set after initialization")
-            for vr in vrs:
-                if not 0 <= vr < len(self.variables) or self.variables[vr].type != kind:
-                    raise TypeError(f"{self._name_of(vr)} is not of type {kind}")
+            self._check_kind(vrs, kind)
             end = len(self.variables)
-            self._set_before_start(self._others, vrs, values, self._n_real, end)
+            stored = [_from_host(self.variables[vr], x) for vr, x in zip(vrs, values, strict=True)]
+            self._set_before_start(self._others, vrs, stored, self._n_real, end)
         except BaseException:
             self._fail(f"setting {kind} {_unsigned(vrs)} failed", self._start_time)
+
+    def _check_kind(self, vrs: list[int], kind: str) -> None:
+        """Raise TypeError if a variable is set and read as another type, an Enumeration as Integer."""
+        for vr in vrs:
+            known = 0 <= vr < len(self.variables)
+            type = self.variables[vr].fmi_type.replace("Enumeration", "Integer") if known else ""
+            if type != kind:
+                raise TypeError(f"{self._name_of(vr)} is not of type {kind}")
 
     def get_integer(self, vrs: list[int]) -> list[int]:
         return self._get_other(vrs, "Integer", 0)

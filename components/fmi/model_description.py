@@ -8,7 +8,7 @@ the content.
 from collections.abc import Mapping, Sequence
 from xml.etree.ElementTree import Element, SubElement
 
-from yawbench.vocabulary.units import UNITS
+from yawbench.vocabulary.units import DISPLAYED, UNITS
 
 from .variables import VariableSpec
 
@@ -66,7 +66,18 @@ def to_xml(
         definitions = SubElement(root, "UnitDefinitions")
         for unit in sorted(used):
             exponents = {base: str(power) for base, power in UNITS[unit].items()}
-            SubElement(SubElement(definitions, "Unit", name=unit), "BaseUnit", exponents)
+            defined = SubElement(definitions, "Unit", name=unit)
+            SubElement(defined, "BaseUnit", exponents)
+            if unit in DISPLAYED:
+                shown, factor = DISPLAYED[unit]
+                SubElement(defined, "DisplayUnit", name=shown, factor=repr(factor))
+    chosen = [v for v in variables if v.choices is not None]
+    if chosen:
+        types = SubElement(root, "TypeDefinitions")
+        for v in chosen:
+            items = SubElement(SubElement(types, "SimpleType", name=_type_of(v)), "Enumeration")
+            for number, choice in enumerate(v.choices or (), start=1):
+                SubElement(items, "Item", name=choice, value=str(number))
     categories = SubElement(root, "LogCategories")
     for category, text in LOG_CATEGORIES.items():
         SubElement(categories, "Category", name=category, description=text)
@@ -81,6 +92,11 @@ def to_xml(
     return root
 
 
+def _type_of(v: VariableSpec) -> str:
+    """Return the name of the type of an Enumeration; no variable may have it."""
+    return f"Choices_{v.name}"
+
+
 def _scalar_variable(parent: Element, reference: int, v: VariableSpec) -> None:
     text = v.description
     if v.choices is not None:
@@ -90,14 +106,20 @@ def _scalar_variable(parent: Element, reference: int, v: VariableSpec) -> None:
     if v.causality != "input":
         attributes["initial"] = "exact" if v.causality == "parameter" else "calculated"
     element = SubElement(parent, "ScalarVariable", attributes)
-    typed = SubElement(element, v.type)
+    typed = SubElement(element, v.fmi_type)
     if v.unit is not None:
         typed.set("unit", v.unit)
+        if v.unit in DISPLAYED:
+            typed.set("displayUnit", DISPLAYED[v.unit][0])
+    if v.choices is not None:
+        typed.set("declaredType", _type_of(v))
     for key, limit in (("min", v.minimum), ("max", v.maximum)):
         if limit is not None:
             typed.set(key, repr(limit))
     if v.start is not None:
         start = str(v.start).lower() if v.type == "Boolean" else str(v.start)
+        if v.choices is not None:
+            start = str(v.choices.index(v.start) + 1)
         typed.set("start", repr(float(v.start)) if v.type == "Real" else start)
     attributes = {"optional": "true" * v.optional, "choices": ", ".join(v.choices or ()), "source": v.source}
     if any(attributes.values()):  # FMI has no attributes for these; other tools ignore the annotation

@@ -40,6 +40,11 @@ class VariableSpec:
     optional: bool = False
     source: str = ""
 
+    @property
+    def fmi_type(self) -> str:
+        """Its type in the FMU: a text with choices is an Enumeration, which more hosts can set."""
+        return self.type if self.choices is None else "Enumeration"
+
 
 def signal(
     name: str,
@@ -173,6 +178,7 @@ def parameter(
     minimum: float | None = None,
     maximum: float | None = None,
     choices: Iterable[str] | None = None,
+    tunable: bool = False,
 ) -> Any:
     """Declare a parameter as a dataclass field: default, unit, description, source and allowed values.
 
@@ -182,7 +188,9 @@ def parameter(
         >>> Parameters().gain
         20000.0
 
-    The FMI type follows from the default's type. `unit` is None for all types but Real.
+    The FMI type follows from the default's type; a text with choices is an Enumeration. `unit` is None
+    for all types but Real. A `tunable` Real, such as a gain, may be set between steps: `configure` is called
+    before the next.
     `source` says where the default comes from; its first word is the kind of source: "paper A, table 1",
     "chosen: why", "erratum: what is printed", or any other text for other literature.
     """
@@ -192,6 +200,8 @@ def parameter(
         raise DeclarationError(f"parameter: default must be one of {known} (got {type(default).__name__})")
     if kind == "Real":
         _check("parameter", "default", default, float)
+    elif tunable:
+        raise DeclarationError(f"parameter: only a float can be tunable (got {type(default).__name__})")
     _check("parameter", "unit", unit, str, optional=True)
     _check("parameter", "description", description, str)
     _check("parameter", "source", source, str)
@@ -203,7 +213,7 @@ def parameter(
         description,
         causality="parameter",
         type=kind,
-        variability="fixed",
+        variability="tunable" if tunable else "fixed",
         start=default,
         minimum=minimum,
         maximum=maximum,

@@ -96,6 +96,8 @@ def _parameters(parameters: list[Any], sources: dict[str, str]) -> str:
         limits = [f"≥ {_number(v.min)}"] if v.min is not None else []
         limits += [f"≤ {_number(v.max)}"] if v.max is not None else []
         value = _number(v.start) if v.type == "Real" else str(v.start)
+        if v.type == "Enumeration":
+            value = next(item.name for item in v.declaredType.items if item.value == v.start)
         meaning, source = cell(v.description or ""), cell(sources.get(v.name, ""))
         rows.append((code(v.name), code(value), code(v.unit or ""), ", ".join(limits), meaning, source))
     return table(("parameter", "default", "unit", "allowed", "meaning", "source"), rows)

@@ -8,7 +8,6 @@ give the same bytes.
 from __future__ import annotations
 
 import hashlib
-import shutil
 import sys
 import uuid
 from dataclasses import dataclass
@@ -18,34 +17,32 @@ from xml.etree import ElementTree
 from yawbench.foundation.errors import BuildError
 from yawbench.vocabulary.roles import ROLES
 
-from ..compiler import compile_library, compiler_command, compiler_tools, compiler_version
+from ..build_stamp import PLAIN, Edition
+from ..compiler import compile_library, compiler_command, compiler_version, libraries_for
 from ..description import platform
+from ..native.build import HEADERS as COMMON
 from ..packing import DESCRIPTION
 from ..presentation import PAGE, icon
+from ..recipe import Made, wanted_platforms
+from ..source_archive import source_files
 from ..source_digests import SourceDigests
-from .declaration import header, read_declaration
+from .declaration import headers, read_declaration
 
 HERE = Path(__file__).resolve().parent
+HEADERS = (HERE / "unit.h", *COMMON.values())
 SHARED = (
     Path(__file__),
     HERE / "declaration.py",
-    HERE / "unit.h",
-    HERE.parent / "calling_sequence.h",
-    HERE.parent / "fmi2.h",
-    HERE.parent / "oldest_glibc.h",
-    HERE.parent / "seal.h",
+    *HEADERS,
     HERE.parent / "compiler.py",
     HERE.parent / "packing.py",
     HERE.parent / "presentation.py",
     PAGE,
 )
 """Files on which every FMU in C depends."""
-FLAGS = ("-std=c11", "-O2", "-Wall", "-Wextra", "-Wno-unused-parameter", "-fPIC", "-shared")
-EXACT = ("-fvisibility=hidden", "-ffp-contract=off")  # no fused multiply-add: same results everywhere
-LINUX = ("-Wl,--build-id=none", "-Wl,-z,defs", "-s")
-TO_WINDOWS = "x86_64-w64-mingw32-gcc"
-"""Compiler for 64-bit Windows; if installed, FMUs also get a library for Windows."""
-WINDOWS = ("-static", "-Wl,--no-insert-timestamp", "-s")
+EXACT = ("-std=c11", "-ffp-contract=off")  # no fused multiply-add: same results everywhere
+FLAGS = (*EXACT, "-O2", "-Wall", "-Wextra", "-Wno-unused-parameter", "-shared", "-fvisibility=hidden")
+LINUX = ("-fPIC", "-Wl,--build-id=none", "-Wl,-z,defs", "-s")
 
 
 def find_c_components(root: Path) -> dict[str, Path]:
@@ -89,27 +86,14 @@ class CRecipe:
         return {file.name: file.read_text("utf-8", "replace") for file in self._files()[1:]}
 
     def key(self) -> str:
-        compiler = compiler_command()
-        to_windows = compiler_version([TO_WINDOWS]) if _reaches_windows() else ""
-        versions = [compiler_version(compiler), to_windows, *WINDOWS]
-        content = hashlib.sha256("\0".join([self.name, *compiler, *versions, *FLAGS, *EXACT]).encode())
+        content = hashlib.sha256("\0".join([self.name, *LINUX, *FLAGS]).encode())
         for file in [*SHARED, *icon(self.role), *self._files()]:
             data = file.read_bytes()
             content.update(f"{file.name}\0{len(data)}\0".encode() + data)
         return content.hexdigest()[:32]
 
     def evidence(self) -> dict[str, str]:
-        return SourceDigests().evidence(
-            [
-                self.source,
-                self._twin,
-                *SHARED,
-                *icon(self.role),
-                *self._files(),
-                *compiler_tools(),
-                f"tool:{TO_WINDOWS}",
-            ]
-        )
+        return SourceDigests().evidence([self.source, self._twin, *SHARED, *icon(self.role), *self._files()])
 
     @property
     def _twin(self) -> Path:
@@ -118,10 +102,12 @@ class CRecipe:
     def _files(self) -> list[Path]:
         return [self.source / DESCRIPTION, *sorted(self.source.glob("*.[ch]"))]
 
-    def make(self, *, hurry: bool = False) -> tuple[dict[str, bytes], tuple[str, ...]]:
+    def make(self, *, hurry: bool = False, edition: Edition = PLAIN) -> Made:
+        """Return the files of the archive (see `PythonRecipe.make`)."""
         if self._twin.exists():
             folder = self.source
             raise BuildError(f"there are both {folder.name}.py and {folder.name}/ in {folder.parent}")
+        compiler_version(compiler_command())  # raises if there is none
         description, *code = self._files()
         sources = {file.name: file.read_bytes() for file in code}
         c_files = [name for name in sources if name.endswith(".c")]
@@ -130,24 +116,22 @@ class CRecipe:
         role = ROLES[self.source.parent.name]
         root, variables = read_declaration(description.read_bytes(), self.name, role)
         root.set("guid", _guid(root, sources))
-        sources["variables.h"] = header(variables, root.get("guid", "")).encode()
-        common = [*FLAGS, *EXACT, "-I.", f"-I{HERE}", f"-I{HERE.parent}", *c_files, "-lm"]
+        made = headers(variables, root.get("guid", ""))
+        sources |= {name: text.encode() for name, text in made.items()}
+        sources |= {header.name: header.read_bytes() for header in HEADERS}
+        arguments = [*FLAGS, *c_files, "-lm"]
         system, suffix = platform()
         own = LINUX if sys.platform == "linux" else ()
+        library = compile_library(compiler_command(), sources, *own, *arguments)
         files = {
             DESCRIPTION: ElementTree.tostring(root, encoding="UTF-8", xml_declaration=True) + b"\n",
-            f"binaries/{system}/{self.name}{suffix}": compile_library(
-                compiler_command(), sources, *own, *common
-            ),
+            f"binaries/{system}/{self.name}{suffix}": library,
         }
-        if _reaches_windows():
-            library = compile_library([TO_WINDOWS], sources, *WINDOWS, *common)
-            files[f"binaries/win64/{self.name}.dll"] = library
-        return files, ()
-
-
-def _reaches_windows() -> bool:
-    return sys.platform == "linux" and shutil.which(TO_WINDOWS) is not None
+        if not hurry and sys.platform == "linux":
+            files |= libraries_for(wanted_platforms(edition), self.name, sources, *arguments)
+        if edition.sources:
+            files |= source_files(sources, c_files, self.name, EXACT)
+        return Made(files, later=hurry and bool(edition.platforms))
 
 
 def _guid(root: ElementTree.Element, sources: dict[str, bytes]) -> str:

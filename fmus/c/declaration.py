@@ -23,6 +23,7 @@ class CVariable:
     start: float
     minimum: float | None
     maximum: float | None
+    tunable: bool
 
 
 def read_declaration(xml: bytes, name: str, role: Role) -> tuple[ElementTree.Element, list[CVariable]]:
@@ -81,25 +82,34 @@ def _variable(element: ElementTree.Element, real: ElementTree.Element) -> CVaria
         start=number("start") or 0.0,
         minimum=number("min"),
         maximum=number("max"),
+        tunable=element.get("variability") == "tunable",
     )
 
 
-def header(variables: list[CVariable], guid: str) -> str:
-    """Return the text of variables.h: the variables as members of a struct, and their declarations."""
+def headers(variables: list[CVariable], guid: str) -> dict[str, str]:
+    """Return the texts of variables.h, a struct with the variables, and declared.h, their declarations."""
     members, declared = [], []
+    causalities = [v.causality for v in variables]
+    numbers = [causalities[:i].count("output") for i in range(len(causalities))]
     for v in variables:
         text = " ".join(v.description.replace("*/", "* /").split())
         members.append(f"    double {v.name}; /* {v.causality}, {v.unit}: {text} */")
         low = "-INFINITY" if v.minimum is None else repr(v.minimum)
         high = "INFINITY" if v.maximum is None else repr(v.maximum)
-        declared.append(f'    {{"{v.name}", {v.causality.upper()}, {v.start!r}, {low}, {high}}},')
-    return "\n".join([
-        f"/* Made from {DESCRIPTION} by yawbench build. */",
-        "#include <math.h>",
-        "typedef struct {", *members, "} Variables;",
-        "enum { INPUT, OUTPUT, PARAMETER };",
-        f"enum {{ N_VARIABLES = {len(variables)} }};",
-        "static const struct { const char *name; int causality; double start, min, max; } DECLARED[] = {",
+        place = f"offsetof(Variables, {v.name})"
+        kind = f"REAL, {v.causality.upper()}, {int(v.tunable)}, {place}"
+        declared.append(f'    {{"{v.name}", {kind}, {v.start!r}, {low}, {high}, NULL, 0}},')
+    made = f"/* Made from {DESCRIPTION} by yawbench build. */"
+    struct = [made, "#include <math.h>", "typedef struct {", *members, "} Variables;", ""]
+    rows = [
+        made,
+        '#include "unit_parts.h"',
+        f"enum {{ N_VARIABLES = {len(variables)}, N_REALS = N_VARIABLES,",
+        f"       N_INPUTS = {causalities.count('input')},",
+        f"       N_OUTPUTS = {causalities.count('output')} }};",
+        "static const Declared DECLARED[] = {",
         *declared, "};",
+        f"static const unsigned OUTPUT_NUMBERS[] = {{{', '.join(map(str, numbers))}}};",
         f'#define GUID "{guid}"', "",
-    ])  # fmt: skip
+    ]  # fmt: skip
+    return {"variables.h": "\n".join(struct), "declared.h": "\n".join(rows)}

@@ -1,8 +1,9 @@
 """Builds the native library of a component: translates it to C, compiles, and compares with Python.
 
 Verified libraries are cached by the C text (which contains the GUID, and thus depends on the component's
-sources), the headers, the compilers, the comparison and the Python used in the comparison. A change of the
-translator that leaves the C text unchanged needs no compilation.
+sources), the headers, the compiler, the comparison and the Python used in the comparison. A change of the
+translator that leaves the C text unchanged needs no compilation. Libraries for other platforms are compiled
+from the same text and not compared.
 """
 
 from __future__ import annotations
@@ -11,12 +12,10 @@ import hashlib
 import json
 import os
 import platform
-import shutil
 import sys
 import tempfile
 from base64 import b64decode, b64encode
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
@@ -26,25 +25,34 @@ from yawbench.foundation.cache import keep, recall
 from yawbench.foundation.errors import BuildError
 
 from .. import usual_ranges
-from ..compiler import compile_library, compiler_command, compiler_version
+from ..compiler import (
+    OWN,
+    Platform,
+    compile_library,
+    compiler_command,
+    compiler_version,
+    libraries_for,
+)
+from ..source_archive import source_files
 from . import compare_with_python, ir
 from .emit import emit
 from .specialise import Program, specialise
 from .values import Refused
 
 HERE = Path(__file__).resolve().parent
-SHARED = [HERE.parent / name for name in ("calling_sequence.h", "fmi2.h", "oldest_glibc.h", "seal.h")]
-HEADERS = {file.name: file for file in (HERE / "arithmetic.h", HERE / "unit.h", *SHARED)}
+NAMES = ("calling_sequence.h", "fmi2.h", "fmi2_unit.h", "fmi3.h", "fmi3_unit.h", "fmi_unit.h",
+         "oldest_glibc.h", "seal.h", "unit_parts.h")  # fmt: skip
+HEADERS = {file.name: file for file in (HERE / "arithmetic.h", *(HERE.parent / n for n in NAMES))}
 NATIVE_LIBRARY = "native.so"
 """Name of the native library, in the folder of the launcher, which opens it by this name."""
-FLAGS = ("-std=c11", "-ffp-contract=off", "-frounding-math", "-fno-builtin", "-fno-math-errno", "-w", "-fPIC",
-         "-shared", "-fvisibility=hidden")  # fmt: skip
+EXACT = ("-std=c11", "-ffp-contract=off", "-frounding-math", "-fno-builtin", "-fno-math-errno")
 """Compiler flags: functions are those of libm, as in CPython, neither replaced nor fused by the compiler.
 Without `-frounding-math`, GCC 12 replaces 0.0 - x by -x if x is an absolute value or was an integer,
 which is wrong for 0."""
-LINUX = ("-O2", "-Wl,--build-id=none", "-Wl,-z,defs", "-s")
-TO_WINDOWS = "x86_64-w64-mingw32-gcc"
-WINDOWS = ("-O1", "-static", "-Wl,--no-insert-timestamp", "-s")
+FLAGS = (*EXACT, "-w", "-shared", "-fvisibility=hidden")
+LINUX = OWN.flags
+OF_COMPILER = ("compiler-missing", "compiler-failed")
+"""Codes of errors that are the compiler's, and not the component's."""
 STORE = "native"
 """Folder of native libraries in the cache."""
 EFFORTS = "efforts"
@@ -66,24 +74,21 @@ class Native:
     Attributes:
         files: path in the archive -> content.
         why_not: reason if there are none, else "".
+        later: whether another build may have them: with a compiler, or with more time.
         untried: files and lines of branches that were never compared with Python.
         new: whether they were compiled, and not in the cache.
     """
 
     files: dict[str, bytes] = field(default_factory=dict)
     why_not: str = ""
+    later: bool = False
     untried: tuple[str, ...] = ()
     new: bool = field(default=False, compare=False)
 
 
-def tools() -> list[str]:
-    """Return the items other than sources that determine a native library (see `evidence`)."""
-    return [f"tool:{TO_WINDOWS}"]
-
-
 def toolchain() -> str:
-    """Return a text that changes with translator, compilers and comparison."""
-    return _compilers(tuple(compiler_command())) + _digests(*sorted(HERE.glob("*.py")))
+    """Return a text that changes with translator and comparison, but not with the installed compilers."""
+    return "\0".join([*FLAGS, *LINUX]) + _digests(*HEADERS.values(), *sorted(HERE.glob("*.py")))
 
 
 def _comparison() -> str:
@@ -95,11 +100,7 @@ def _comparison() -> str:
 
 @cache
 def _compilers(compiler: tuple[str, ...]) -> str:
-    parts = [platform.python_version(), *FLAGS, *LINUX, *WINDOWS]
-    for command in (compiler, (TO_WINDOWS,)):
-        parts += command
-        if shutil.which(command[0]):
-            parts.append(compiler_version(command))
+    parts = [platform.python_version(), *FLAGS, *LINUX, *compiler, compiler_version(compiler)]
     return "\0".join(parts) + _digests(*HEADERS.values())
 
 
@@ -121,6 +122,8 @@ def native(
     hurry: bool = False,
     closed: bool = False,
     limit: int = compare_with_python.LIMIT,
+    others_too: Sequence[Platform] = (),
+    with_sources: bool = False,
 ) -> Native:
     """Return the native libraries of a component, or the reason why there are none.
 
@@ -137,6 +140,8 @@ def native(
         closed: end calls with an error in branches that were never compared with Python; for whoever can
             then go on in Python. Others are told of these branches.
         limit: largest processor time [s] of the comparison.
+        others_too: further platforms to compile for; not with `closed`.
+        with_sources: add the sources in C.
     """
     if sys.platform != "linux" or platform.machine() != "x86_64":
         return Native(why_not=f"native libraries are built on Linux on x86-64, this is {platform.system()}")
@@ -145,7 +150,7 @@ def native(
         entry = hashlib.sha256(component.fmu_name.encode()).hexdigest()
         effort = recall(EFFORTS, entry)
         if hurry and float(effort or 0.0) > LONGEST:
-            return Native(why_not=LATER)
+            return Native(why_not=LATER, later=True)
         for opened, where in read:
             raise Refused(f"{opened} is read at every import, and may change after the build", where)
         began = _processor_time()
@@ -154,16 +159,25 @@ def native(
         if len(text) > MOST_TEXT:
             raise Refused(f"its translation to C is too long ({len(text) / 1e6:.1f} million characters)")
         if hurry and effort is None and len(text) > MOST_IN_HURRY:
-            return Native(why_not=LATER)
+            return Native(why_not=LATER, later=True)
         thresholds = _thresholds(program)
         made = _let_through(text, component, guid, resources, limit, hurry, thresholds)
         if made.new:
             keep(EFFORTS, entry, str(_processor_time() - began).encode())
-        return made if closed else _opened(made)
+        if closed or made.why_not:
+            return made
+        sources = _sources(component.fmu_name, text)
+        further = libraries_for(
+            others_too, component.fmu_name, sources, *FLAGS, f"{component.fmu_name}.c", "-lm"
+        )
+        if with_sources:
+            further |= source_files(sources, [f"{component.fmu_name}.c"], component.fmu_name, EXACT)
+        made = _opened(made)
+        return replace(made, files={**made.files, **further})
     except Refused as refused:
         return Native(why_not=str(refused))
     except BuildError as error:
-        return Native(why_not=str(error.diagnostics[0]))
+        return Native(why_not=str(error.diagnostics[0]), later=error.code in OF_COMPILER)
     except Exception as error:  # whatever fails here, the FMU works in Python
         return Native(why_not=f"not translated: {type(error).__name__}: {error}")
 
@@ -194,13 +208,13 @@ def _let_through(
     if kept is not None:
         record = json.loads(kept)
         files = {path: b64decode(content) for path, content in record["files"].items()}
-        return Native(files, record["why_not"], tuple(record["untried"]))
+        return Native(files, record["why_not"], untried=tuple(record["untried"]))
     try:
         most = min(limit, int(LONGEST)) if hurry else limit
         made = _made(text, component, guid, resources, most, thresholds)
     except TimeoutError as error:
         if hurry:
-            return Native(why_not=LATER, new=True)
+            return Native(why_not=LATER, later=True, new=True)
         made = Native(why_not=str(error), new=True)
     contents = {path: b64encode(content).decode() for path, content in made.files.items()}
     record = {"files": contents, "why_not": made.why_not, "untried": made.untried}
@@ -217,24 +231,21 @@ def _made(
     thresholds: Sequence[float],
 ) -> Native:
     name = component.fmu_name
-    sources = {f"{name}.c": text.encode()} | {n: file.read_bytes() for n, file in HEADERS.items()}
-    compilers = {f"binaries/linux64/{NATIVE_LIBRARY}": (compiler_command(), LINUX)}
-    if shutil.which(TO_WINDOWS):
-        compilers[f"binaries/win64/{name}.dll"] = ([TO_WINDOWS], WINDOWS)
-
-    def compiled(command: list[str], flags: tuple[str, ...]) -> bytes:
-        return compile_library(command, sources, *flags, *FLAGS, f"{name}.c", "-lm")
-
-    with ThreadPoolExecutor() as pool:
-        files = dict(zip(compilers, pool.map(compiled, *zip(*compilers.values(), strict=True)), strict=True))
+    sources = _sources(name, text)
+    path = f"binaries/{OWN.folder}/{NATIVE_LIBRARY}"
+    made = compile_library(compiler_command(), sources, *LINUX, *FLAGS, f"{name}.c", "-lm")
     with tempfile.TemporaryDirectory(prefix="yawbench_") as folder:
         library = Path(folder, f"{name}.so")
-        library.write_bytes(files[f"binaries/linux64/{NATIVE_LIBRARY}"])
+        library.write_bytes(made)
         compared = compare_with_python.differences(library, guid, component, resources, thresholds, limit)
     if compared.difference:
         return Native(why_not=f"the translation is not the same as Python: {compared.difference}", new=True)
-    files = {path: _closed(data, compared.reached) for path, data in files.items()}
-    return Native(files, untried=compared.untried, new=True)
+    return Native({path: _closed(made, compared.reached)}, untried=compared.untried, new=True)
+
+
+def _sources(name: str, text: str) -> dict[str, bytes]:
+    """Return the sources of a library: the C text of a component, and the headers."""
+    return {f"{name}.c": text.encode()} | {n: file.read_bytes() for n, file in HEADERS.items()}
 
 
 def _opened(made: Native) -> Native:

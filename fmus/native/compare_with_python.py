@@ -1,5 +1,7 @@
 """Bitwise comparison of a native library with its Python component under the same sequence of calls.
 
+The library is called twice, by the functions of FMI 2.0 and by those of FMI 3.0.
+
 The library notes which of its branches are reached. Inputs for the others are searched in the library alone,
 which is fast, and what reaches more of them is compared as well (`_search`).
 
@@ -22,10 +24,21 @@ import random
 import signal
 import struct
 from collections.abc import Callable, Iterator, Sequence
-from ctypes import CFUNCTYPE, byref, c_char_p, c_double, c_int, c_size_t, c_uint, c_void_p
+from ctypes import (
+    CFUNCTYPE,
+    byref,
+    c_bool,
+    c_char_p,
+    c_double,
+    c_int,
+    c_longlong,
+    c_size_t,
+    c_uint,
+    c_void_p,
+)
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from ..usual_ranges import usual_range
 from .ir import ALONE
@@ -55,6 +68,7 @@ MOST_FOUND = 15
 AFTER = 60
 """Steps of a comparison after the last new branch was reached, in which what the branch did shows."""
 _LOGGER = CFUNCTYPE(None, c_void_p, c_char_p, c_int, c_char_p, c_char_p)
+_LOGGER_3 = CFUNCTYPE(None, c_void_p, c_int, c_char_p, c_char_p)
 
 
 class _Callbacks(ctypes.Structure):
@@ -88,18 +102,24 @@ Answer = tuple[bool, list[str], bytes]
 
 
 class Native:
-    """Instance of a native library."""
+    """Instance of a native library, called by the functions of FMI 2.0."""
+
+    fmi = 2
 
     def __init__(self, library: Path, guid: str) -> None:
         self.library = ctypes.CDLL(str(library))
-        self.library.fmi2Instantiate.restype = c_void_p
         self.messages: list[str] = []
-        self._callbacks = _Callbacks(_LOGGER(self._log))
-        call = self.library.fmi2Instantiate
-        made = call(b"native", c_int(1), guid.encode(), None, byref(self._callbacks), c_int(0), c_int(0))
+        made = self._instantiate(guid.encode())
         if made is None:
             raise Difference(f"the native library does not start: {'; '.join(self.messages)}")
         self.instance = c_void_p(made)
+
+    def _instantiate(self, guid: bytes) -> int | None:
+        self._callbacks = _Callbacks(_LOGGER(self._log))
+        call = self.library.fmi2Instantiate
+        call.restype = c_void_p
+        made: int | None = call(b"native", c_int(1), guid, None, byref(self._callbacks), c_int(0), c_int(0))
+        return made
 
     def _log(self, environment: Any, name: bytes, status: int, category: bytes, text: bytes) -> None:
         self.messages.append(text.decode("utf-8", "replace").replace("%%", "%"))
@@ -112,11 +132,10 @@ class Native:
         return self._answer(self.library.fmi2Reset(self.instance))
 
     def set(self, kind: str, refs: Sequence[int], values: Sequence[Any]) -> Answer:
-        type: Any = {"Real": c_double, "String": c_char_p}.get(kind, c_int)
-        encoded = [v.encode() if isinstance(v, str) else v for v in values]
-        call = getattr(self.library, f"fmi2Set{kind}")
+        type = c_double if kind == "Real" else c_int
+        call = getattr(self.library, f"fmi2Set{kind.replace('Enumeration', 'Integer')}")
         n = len(refs)
-        return self._answer(call(self.instance, (c_uint * n)(*refs), c_size_t(n), (type * n)(*encoded)))
+        return self._answer(call(self.instance, (c_uint * n)(*refs), c_size_t(n), (type * n)(*values)))
 
     def get(self, refs: Sequence[int]) -> Answer:
         n = len(refs)
@@ -153,6 +172,78 @@ class Native:
         if status == 0:
             status = self.library.fmi2SetFMUstate(self.instance, state)
             self.library.fmi2FreeFMUstate(self.instance, byref(state))
+        return self._answer(status)
+
+
+class Native3(Native):
+    """Instance of a native library, called by the functions of FMI 3.0."""
+
+    fmi = 3
+    _TYPES: ClassVar[dict[str, tuple[str, Any]]] = {
+        "Real": ("Float64", c_double),
+        "Integer": ("Int32", c_int),
+        "Boolean": ("Boolean", c_bool),
+        "Enumeration": ("Int64", c_longlong),
+    }
+
+    def _instantiate(self, guid: bytes) -> int | None:
+        self._logger = _LOGGER_3(self._log_3)
+        call = self.library.fmi3InstantiateCoSimulation
+        call.restype = c_void_p
+        no = c_bool(False)
+        made: int | None = call(
+            b"native", guid, None, no, no, no, no, None, c_size_t(0), None, self._logger, None
+        )
+        return made
+
+    def _log_3(self, environment: Any, status: int, category: bytes, text: bytes) -> None:
+        self.messages.append(text.decode("utf-8", "replace"))
+
+    def reset(self) -> Answer:
+        return self._answer(self.library.fmi3Reset(self.instance))
+
+    def set(self, kind: str, refs: Sequence[int], values: Sequence[Any]) -> Answer:
+        name, type = self._TYPES[kind]
+        n = len(refs)
+        arrays = (c_uint * n)(*(r + 1 for r in refs)), c_size_t(n), (type * n)(*values), c_size_t(n)
+        return self._answer(getattr(self.library, f"fmi3Set{name}")(self.instance, *arrays))
+
+    def get(self, refs: Sequence[int]) -> Answer:
+        n = len(refs)
+        values = (c_double * n)()
+        arrays = (c_uint * n)(*(r + 1 for r in refs)), c_size_t(n), values, c_size_t(n)
+        return self._answer(self.library.fmi3GetFloat64(self.instance, *arrays), bytes(values))
+
+    def begin(self, t: float) -> Answer:
+        no, nothing = c_bool(False), c_double(0)
+        enter = self.library.fmi3EnterInitializationMode
+        return self._answer(enter(self.instance, no, nothing, c_double(t), no, nothing))
+
+    def end_initialization(self) -> Answer:
+        return self._answer(self.library.fmi3ExitInitializationMode(self.instance))
+
+    def step(self, t: float, h: float) -> Answer:
+        flags, reached = [c_bool() for _ in range(3)], c_double()
+        step = self.library.fmi3DoStep
+        done = step(self.instance, c_double(t), c_double(h), c_bool(True), *map(byref, flags), byref(reached))
+        return self._answer(done)
+
+    def save(self) -> bytes:
+        state, size = c_void_p(), c_size_t()
+        self.library.fmi3GetFMUState(self.instance, byref(state))
+        self.library.fmi3SerializedFMUStateSize(self.instance, state, byref(size))
+        content = ctypes.create_string_buffer(size.value)
+        self.library.fmi3SerializeFMUState(self.instance, state, content, size)
+        self.library.fmi3FreeFMUState(self.instance, byref(state))
+        return content.raw
+
+    def restore(self, content: bytes) -> Answer:
+        state = c_void_p()
+        size = c_size_t(len(content))
+        status = self.library.fmi3DeserializeFMUState(self.instance, content, size, byref(state))
+        if status == 0:
+            status = self.library.fmi3SetFMUState(self.instance, state)
+            self.library.fmi3FreeFMUState(self.instance, byref(state))
         return self._answer(status)
 
 
@@ -214,7 +305,9 @@ class Twin:
         return self._answer()
 
     def set(self, kind: str, refs: Sequence[int], values: Sequence[Any]) -> Answer:
-        getattr(self.instance, f"set_{kind.lower()}")(list(refs), list(values))
+        getattr(self.instance, f"set_{kind.replace('Enumeration', 'Integer').lower()}")(
+            list(refs), list(values)
+        )
         return self._answer()
 
     def get(self, refs: Sequence[int]) -> Answer:
@@ -257,6 +350,7 @@ class Case:
         saved: save the state at the end, go on, restore it, and go on again.
         reset: reset before the state is restored.
         wild: inputs so large are among them that integers computed from them may be inexact.
+        tuned: parameters that are set after the steps, which are then repeated.
     """
 
     label: str
@@ -267,13 +361,15 @@ class Case:
     saved: bool = False
     reset: bool = False
     wild: bool = False
+    tuned: Sequence[tuple[str, int, Any]] = ()
 
 
 class _Beside:
-    """Both instances, called in the same way."""
+    """Instances of the library in both versions of FMI, and of the component, called in the same way."""
 
-    def __init__(self, native: Native, twin: Twin, variables: Sequence[Any]) -> None:
-        self.native, self.twin, self.variables = native, twin, variables
+    def __init__(self, natives: Sequence[Native], twin: Twin, variables: Sequence[Any]) -> None:
+        self.natives, self.twin, self.variables = natives, twin, variables
+        self.native = natives[0]
         self.of = {
             c: [i for i, v in enumerate(variables) if v.causality == c]
             for c in ("input", "output", "parameter")
@@ -299,6 +395,10 @@ class _Beside:
             self._read_early(steps)
         if begun and self.call("end_initialization") and self._outputs():
             t = self._run(steps, case.start)
+            for kind, i, value in case.tuned:
+                self.call("set", kind, [i], [value])
+            if case.tuned:
+                t = self._run(steps, t)
             if case.saved:
                 self._restored(case, t)
 
@@ -325,26 +425,30 @@ class _Beside:
         return t
 
     def _restored(self, case: Case, t: float) -> None:
-        kept = self.native.save(), self.twin.save()
+        kept = [native.save() for native in self.natives], self.twin.save()
         if not kept[1]:  # Python cannot copy it
             self.twin.messages.clear()
             return
         self._run(case.steps[:FEW], t)
         if case.reset:
             self.call("reset")
-        if self.native.restore(kept[0])[0] != self.twin.restore(kept[1])[0]:
+        restored = self.twin.restore(kept[1])[0]
+        if any(n.restore(k)[0] != restored for n, k in zip(self.natives, kept[0], strict=True)):
             raise Difference(f"{self.label}: a saved state is not restored")
         self._outputs()
         self._run(case.steps[-FEW:], t)
 
     def call(self, what: str, *args: Any) -> bool:
         """Call both and return whether they succeeded."""
-        native, python = getattr(self.native, what)(*args), getattr(self.twin, what)(*args)
-        if self.wild and not native[0] and any(ALONE in text for text in native[1]):
+        natives = [getattr(native, what)(*args) for native in self.natives]
+        python = getattr(self.twin, what)(*args)
+        if self.wild and not natives[0][0] and any(ALONE in text for text in natives[0][1]):
             return False
-        if native[0] != python[0] or native[1] != python[1] or not _same(native[2], python[2]):
-            raise Difference(f"{self.label}: {what}{_shown(args)}: {self._apart(native, python)}")
-        return native[0]  # type: ignore[no-any-return]
+        for native, instance in zip(natives, self.natives, strict=True):
+            if native[0] != python[0] or native[1] != python[1] or not _same(native[2], python[2]):
+                by = f"{self.label}: {what}{_shown(args)}" + " by FMI 3.0" * (instance.fmi == 3)
+                raise Difference(f"{by}: {self._apart(native, python)}")
+        return natives[0][0]  # type: ignore[no-any-return]
 
     def _apart(self, native: Answer, python: Answer) -> str:
         if native[0] != python[0]:
@@ -448,7 +552,9 @@ class Cases:
             start, early = chance.choice((0.25, 0.25, 0.25, 0.25, *STARTS)), number % 5 == 0
             label += f"start at {start:g} s" + ", outputs read before initialization ends" * early
             made = steps(chance.choice(LENGTHS), few)
-            yield Case(label, settings, start, made, early, saved=number % 4 == 0, reset=number % 8 == 0)
+            tuned = self._tuned(chance) if number % 3 == 0 else []
+            saved, reset = number % 4 == 0, number % 8 == 0
+            yield Case(label, settings, start, made, early, saved=saved, reset=reset, tuned=tuned)
         for k in range(self.inputs):
             for value in EXTREME:
                 made = steps(LENGTHS[0], 4)
@@ -461,7 +567,12 @@ class Cases:
         for i, v in self.parameters:
             values, wrong = _values(v)
             few = v.type == "Real" and len(self.parameters) > MANY
-            yield from ((v.type, i, x) for x in ([*values[:1], *wrong] if few else [*values, *wrong]))
+            yield from ((v.fmi_type, i, x) for x in ([*values[:1], *wrong] if few else [*values, *wrong]))
+
+    def _tuned(self, chance: random.Random) -> list[tuple[str, int, Any]]:
+        """Return values of the tunable parameters, some of them wrong now and then."""
+        tunable = [(i, v) for i, v in self.parameters if v.variability == "tunable"]
+        return [("Real", i, chance.choice((1.25, 0.6, 0.6, -1.0)) * v.start) for i, v in tunable]
 
     def _moved(self, chance: random.Random) -> list[tuple[str, int, Any]]:
         """Return values of all real parameters near their defaults, and choices of all others."""
@@ -470,7 +581,7 @@ class Cases:
             if v.type == "Real":
                 moved.append(("Real", i, v.start * chance.uniform(0.8, 1.25)))
             elif v.type != "Integer":
-                moved.append((v.type, i, chance.choice(_values(v)[0])))
+                moved.append((v.fmi_type, i, chance.choice(_values(v)[0])))
         return moved
 
     def searched(self) -> Iterator[Case]:
@@ -483,12 +594,8 @@ class Cases:
 
     def _wild(self, label: str, number: int, chance: random.Random, count: int) -> Case:
         moved = chance.sample(self.parameters, min(len(self.parameters), chance.choice((0, 1, 2, 4))))
-        settings = [(v.type, i, self._value(v, chance)) for i, v in moved]
-        settings += [
-            ("String", i, v.choices[number % len(v.choices)])
-            for i, v in self.parameters
-            if v.type == "String"
-        ]
+        settings = [(v.fmi_type, i, self._value(v, chance)) for i, v in moved]
+        settings += [("Enumeration", i, 1 + number % len(v.choices)) for i, v in self.parameters if v.choices]
         if chance.random() < 0.5:  # what is off by default is switched on
             size = [chance.choice((1.0, -1.0)) * 10.0 ** chance.uniform(-2.0, 4.0) for _ in self.parameters]
             off = [(i, v, x) for (i, v), x in zip(self.parameters, size, strict=True) if v.type == "Real"]
@@ -518,8 +625,8 @@ class Cases:
 def _values(v: Any) -> tuple[list[Any], list[Any]]:
     """Return values of a parameter, which may lie outside its limits, and some that are wrong."""
     limits = [x for x in (v.minimum, v.maximum) if x is not None and abs(x) < 1e30]
-    if v.type == "String":
-        return list(v.choices), ["none of them"]
+    if v.choices is not None:
+        return list(range(1, 1 + len(v.choices))), [0, 1 + len(v.choices)]
     if v.type == "Boolean":
         return [True, False], []
     if v.type == "Integer":
@@ -564,7 +671,8 @@ def compare(
     Raises:
         Difference: the first difference.
     """
-    beside = _Beside(Native(library, guid), Twin(component, resources), component.variables)
+    natives = Native(library, guid), Native3(library, guid)
+    beside = _Beside(natives, Twin(component, resources), component.variables)
     branches, cases = Branches(beside.native.library), Cases(component, thresholds)
     branches.forget()
     for case in cases.usual():

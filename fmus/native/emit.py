@@ -1,4 +1,4 @@
-"""Generates C code from the intermediate form: variables, the four functions, and the include of `unit.h`."""
+"""Generates C code from the intermediate form: variables, the four functions, and include of `fmi_unit.h`."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _SIGNATURES = {
 
 
 def emit(program: Program, source: str, guid: str) -> str:
-    """Return the text of a C file for a program, which includes `arithmetic.h` and `unit.h`."""
+    """Return the text of a C file for a program, which includes `arithmetic.h` and `fmi_unit.h`."""
     lines = [f"/* Made from {source} by yawbench build. */", f"#define UNTRIED {quoted(ir.UNTRIED)}"]
     lines += ['#include "arithmetic.h"', ""]
     lines += _variables(program.variables, guid)
@@ -53,7 +53,7 @@ def emit(program: Program, source: str, guid: str) -> str:
                 own = ir.Function(outlined.body, ())
                 functions += _Function(program, own, made, branches).of_its_own(outlined)
         functions += _Function(program, function, made, branches).lines(name)
-    return "\n".join([*lines, *_table(branches), *functions, '#include "unit.h"', ""])
+    return "\n".join([*lines, *_table(branches), *functions, '#include "fmi_unit.h"', ""])
 
 
 def _table(branches: Iterable[str]) -> list[str]:
@@ -96,23 +96,24 @@ def quoted(text: str) -> str:
 
 
 def _variables(variables: Sequence[Any], guid: str) -> list[str]:
-    kinds = {"Real": "double", "Integer": "int", "Boolean": "int", "String": "int"}
-    members = [f"    {kinds[v.type]} {v.name};" for v in variables]
+    kinds = {"Real": "double", "Integer": "int", "Boolean": "int", "Enumeration": "int"}
+    members = [f"    {kinds[v.fmi_type]} {v.name};" for v in variables]
     lines = ["typedef struct {", *(members or ["    char nothing;"]), "} Variables;", ""]
     lines += [
         f"static const char *const CHOICES_{v.name}[] = {{{', '.join(map(quoted, v.choices))}}};"
         for v in variables
-        if v.type == "String"
+        if v.choices
     ]
     rows = []
     for v in variables:
-        start = v.choices.index(v.start) if v.type == "String" else v.start or 0
+        start = v.choices.index(v.start) if v.choices else v.start or 0
         low = "-INFINITY" if v.minimum is None else constant(v.minimum)
         high = "INFINITY" if v.maximum is None else constant(v.maximum)
-        choices = f"CHOICES_{v.name}, {len(v.choices)}" if v.type == "String" else "NULL, 0"
+        choices = f"CHOICES_{v.name}, {len(v.choices)}" if v.choices else "NULL, 0"
         place = f"offsetof(Variables, {v.name})"
         rows.append(
-            f"    {{{quoted(v.name)}, {v.type.upper()}, {v.causality.upper()}, {place}, "
+            f"    {{{quoted(v.name)}, {v.fmi_type.upper()}, {v.causality.upper()}, "
+            f"{int(v.variability == 'tunable')}, {place}, "
             f"{constant(start)}, {low}, {high}, {choices}}},"
         )
     counts = {c: sum(v.causality == c for v in variables) for c in ("input", "output")}

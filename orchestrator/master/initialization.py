@@ -107,7 +107,7 @@ def _put(slot: InstanceSlot, requested: Mapping[str, Value], what: str, check: S
     others = (v for v in variables.values() if v.reference in arrays) if arrays else ()
     values = {v.name: v.start for v in others if v.start is not None} | dict(requested)
     for chosen in by_type(variables[name] for name in values):
-        status = slot.fmu_instance.put([v.ref for v in chosen], [values[v.name] for v in chosen])
+        status = slot.fmu_instance.put([v.ref for v in chosen], [v.encoded(values[v.name]) for v in chosen])
         check(slot.name, what, status)
 
 

@@ -18,11 +18,11 @@ import pytest
 from tests.fmus.bare import Fmu, Unit
 from tests.fmus.plausible import plausible
 from yawbench.fmus.build import HERE as FMUS
-from yawbench.fmus.c.c_recipe import TO_WINDOWS
+from yawbench.fmus.compiler import TO_WINDOWS, compiler_for
 
 WINE = shutil.which("wine64") or next(map(str, Path("/usr/lib/wine").glob("wine64")), None)
 in_windows = pytest.mark.skipif(
-    WINE is None or shutil.which(TO_WINDOWS) is None, reason="needs Wine and a cross compiler"
+    WINE is None or compiler_for(TO_WINDOWS) is None, reason="needs Wine and a cross compiler"
 )
 MINORS = (10, 11, 12, 13)
 """Minor versions of Python 3 that are supported."""
@@ -79,7 +79,9 @@ def in_wine(
     """
     host = folder / "host.exe"
     source = Path(__file__).with_name("host_windows.c")
-    subprocess.run([TO_WINDOWS, f"-I{FMUS}", source, "-o", host], check=True)
+    compiler = compiler_for(TO_WINDOWS)
+    assert compiler is not None
+    subprocess.run([*compiler[0], f"-I{FMUS}", source, "-o", host], check=True)
     lines, sizes = [], []
     for fmu, inputs in units:
         library = next((fmu.folder / "binaries" / "win64").glob("*.dll"))

@@ -13,11 +13,12 @@ from tests.fmus.bare import ERROR, OK, Fmu, Refused, Unit
 from tests.fmus.programs import in_windows, in_wine, run, ten_steps
 from tests.refusals import each_mentions, mentions, refused
 from yawbench.commands.new import begin
+from yawbench.fmus import recipe
 from yawbench.fmus.build import HERE as FMUS
 from yawbench.fmus.build import build_all, build_component
 from yawbench.fmus.build_stamp import read_stamp
 from yawbench.fmus.c import c_recipe
-from yawbench.fmus.c.c_recipe import TO_WINDOWS
+from yawbench.fmus.compiler import MINGW
 from yawbench.foundation.errors import BuildError
 
 pytestmark = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler")
@@ -28,7 +29,7 @@ def root(tmp_path, monkeypatch):
     """A folder of components with one controller in C, `idea`, that is compiled for Linux, and fast."""
     flags = ["-O0" if flag == "-O2" else flag for flag in c_recipe.FLAGS]
     monkeypatch.setattr(c_recipe, "FLAGS", flags)
-    monkeypatch.setattr(c_recipe, "TO_WINDOWS", "no compiler")
+    monkeypatch.setattr(recipe, "MINGW", "no compiler")
     return begun(tmp_path)
 
 
@@ -197,13 +198,13 @@ def test_it_runs_in_a_c_host_without_python(fmu, tmp_path, host):
 
 
 def test_the_shared_part_compiles_without_warnings(tmp_path, capfd, monkeypatch):
-    monkeypatch.setattr(c_recipe, "TO_WINDOWS", "no compiler")
+    monkeypatch.setattr(recipe, "MINGW", "no compiler")
     build_component(begun(tmp_path) / "controllers" / "idea", tmp_path / "out")
     assert capfd.readouterr().err == ""
     assert (FMUS / "c" / "unit.h").is_file()
 
 
-@pytest.mark.skipif(shutil.which(TO_WINDOWS) is None, reason=f"there is no {TO_WINDOWS}")
+@pytest.mark.skipif(shutil.which(MINGW) is None, reason=f"there is no {MINGW}")
 def test_a_unit_in_c_gets_a_library_for_windows_where_a_compiler_makes_one(tmp_path):
     folder = begun(tmp_path) / "controllers" / "idea"
     first = build_component(folder, tmp_path / "a")
@@ -212,7 +213,7 @@ def test_a_unit_in_c_gets_a_library_for_windows_where_a_compiler_makes_one(tmp_p
         assert names == {"binaries/linux64/controller_idea.so", "binaries/win64/controller_idea.dll"}
         for name in names:
             (tmp_path / Path(name).name).write_bytes(fmu.read(name))
-    objdump = TO_WINDOWS.replace("gcc", "objdump")
+    objdump = MINGW.replace("gcc", "objdump")
     linux, windows = (
         subprocess.run([*map(str, command)], capture_output=True, text=True, check=True).stdout
         for command in (

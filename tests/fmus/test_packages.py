@@ -137,10 +137,14 @@ def test_it_is_suggested_and_listed(install, yawbench):
     install()
     _, _, said = yawbench("run", "half.yaml", "--swap", "controller=controller_folow")
     assert mentions(said, "'controller_follow'")
-    status, out, _ = yawbench("list", "fmus")
+    status, out, said = yawbench("list", "fmus")
     assert status == 0
-    assert "controller_follow" in out
+    assert mentions(out + said, "controller_follow", "yawbench build")  # which a list never does
     assert "controller_off" in out
+    assert yawbench("build", "controller_follow")[0] == 0
+    _, out, said = yawbench("list", "fmus")
+    assert "controller_follow" in out
+    assert "not built" not in out + said
 
 
 def test_a_name_that_is_also_in_the_folder_is_told_and_the_folder_counts(install, yawbench):

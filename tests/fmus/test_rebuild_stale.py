@@ -15,6 +15,7 @@ import pytest
 
 from tests.checkout import CODE, ROOT, copy_checkout, run_in
 from tests.refusals import each_mentions, mentions
+from yawbench.fmus import recipe
 from yawbench.fmus.build import build_component, find_recipes
 from yawbench.fmus.native import build as native_build
 from yawbench.fmus.rebuild_stale import FmuUpdater
@@ -203,8 +204,8 @@ def test_no_run_waits_for_a_native_library_that_takes_long(own, yawbench, monkey
     monkeypatch.chdir(own)
     monkeypatch.setenv("YAWBENCH_CACHE", str(own / "cache"))
     native_build.toolchain()  # the real one is kept for the whole process
-    monkeypatch.setattr(native_build, "TO_WINDOWS", "no compiler")
-    monkeypatch.setattr(native_build, "LINUX", ("-O0",))
+    monkeypatch.setattr(recipe, "MINGW", "no compiler")
+    monkeypatch.setattr(native_build, "LINUX", ("-O0", "-fPIC"))
     build = ("build", OWN, "--out", "fmus")
     yawbench(*build)  # from now on it is known what the library takes
     yawbench("run", "driver.yaml", "--out", "out")

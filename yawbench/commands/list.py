@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
 
-from yawbench.commands.build import report_build
 from yawbench.commands.options import RunOptions, plan_of_scenario, takes
 from yawbench.commands.output import print_tables, tabular
-from yawbench.fmus.opener import Building
 from yawbench.foundation.errors import ModelDescriptionError
 
 Wanted = Annotated[
@@ -40,7 +39,7 @@ def list(options: RunOptions, what: Wanted = None, place: ListedFolder = None, u
     """List runs, scenarios, FMUs, vehicles, signals or metrics.
 
     Runs are listed with their start time, scenario, overrides, status, and the largest sideslip, yaw rate
-    and lateral acceleration.
+    and lateral acceleration. Nothing is built.
     """
     from yawbench.fmus.opener import hidden
     from yawbench.orchestrator.results.reader import found_runs
@@ -56,11 +55,11 @@ def list(options: RunOptions, what: Wanted = None, place: ListedFolder = None, u
         units_table,
     )
 
-    further = [] if place or options.fmus else _further_folders(build=options.build)
+    further, missing = ([], []) if place or options.fmus else _further_folders()
     if units:
         fmus, errors = fmus_in(_folder_of_fmus(place or options.fmus), *further)
         table = units_table(fmus)
-        table.notes += map(str, errors)
+        table.notes += [*map(str, errors), *missing]
         print_tables([table])
         return
     if what is None:
@@ -78,40 +77,48 @@ def list(options: RunOptions, what: Wanted = None, place: ListedFolder = None, u
         table = metrics_table()
     elif what == "signals" and place is not None:
         scenario = catalogue.find(place, "a scenario")
-        table = recorded_table(plan_of_scenario(scenario, options))
+        table = recorded_table(plan_of_scenario(scenario, replace(options, no_build=True)))
     else:
         folder = _folder_of_fmus(place or options.fmus)
         fmus, errors = fmus_in(folder, *further)
         if further:
             errors += hidden((fmu.path.stem for fmu in fmus), folder, packages=True)
         table = fmus_table(fmus, errors)
+        table.notes += missing
         if what == "signals":
             table = signals_table(fmus)
     print_tables([table])
 
 
-def _further_folders(*, build: Building) -> Sequence[Path]:
-    """Return the folders of FMUs that the environment names, and those of packages, whose FMUs are built."""
-    from yawbench.fmus.opener import Opener, further_folders, packaged, packaged_components
+def _further_folders() -> tuple[Sequence[Path], Sequence[str]]:
+    """Return the folders of FMUs that the environment names and those of packages, and what is not built."""
+    from yawbench.fmus.opener import further_folders, packaged, packaged_components
 
-    opener = Opener(build=build)
     components = [component for name in packaged_components() if (component := packaged(name))]
-    archives = [opener.bring_packaged(component) for component in components]
-    return [*dict.fromkeys([*further_folders(), *(archive.parent for archive in archives)])]
+    built = [component.archive for component in components if component.archive.is_file()]
+    missing = [
+        f"{component.fmu} of {component} is not built: yawbench build {component.fmu}"
+        for component in components
+        if component.archive not in built
+    ]
+    return [*dict.fromkeys([*further_folders(), *(archive.parent for archive in built)])], missing
 
 
 def _folder_of_fmus(folder: Path | None) -> Path:
-    """Return the given or the nearest folder of FMUs; if there is none, build the project's FMUs."""
-    from yawbench.fmus.build import build_all
+    """Return the given or the nearest folder of FMUs.
+
+    Raises:
+        ModelDescriptionError: it contains none.
+    """
     from yawbench.fmus.opener import HOME, Opener, find_folder
     from yawbench.fmus.rebuild_stale import build_folder
 
+    advice = ""
     if folder is None:
-        folder = find_folder(Path("here"), opener=Opener(build=True))
+        folder = find_folder(Path("here"), opener=Opener())
         if folder == HOME:
             folder = build_folder(HOME)
-            build_all(folder, progress=report_build)
-        return folder
+            advice = "; 'yawbench build' makes them"
     if not any(folder.glob("*.fmu")):
-        raise ModelDescriptionError(f"{folder}: contains no FMUs", code="fmu-missing")
+        raise ModelDescriptionError(f"{folder}: contains no FMUs{advice}", code="fmu-missing")
     return folder

@@ -140,6 +140,10 @@ Standard = Annotated[
     Literal["1.0", "2.0"] | None,
     typer.Option("--standard", help="Version of SSP. Default: 1.0, or 2.0 for FMUs of FMI 3.0."),
 ]
+Version = Annotated[
+    Literal["2", "3"],
+    typer.Option("--fmi", help="Version of FMI of the FMUs; 3 is for native ones that were built here."),
+]
 For = Annotated[
     Literal["all", "omsimulator"],
     typer.Option("--for", help="Omit what OMSimulator does not support, and list it."),
@@ -153,12 +157,13 @@ def export_ssp(
     out: ArchiveOption = None,
     for_: For = "all",
     standard: Standard = None,
+    fmi: Version = "2",
 ) -> None:
     """Write a scenario and its FMUs as an SSP archive.
 
     SSP: System Structure and Parameterization. `yawbench run` accepts the archive and gives the same numbers.
     """
-    from .ssp_write import for_omsimulator, write_ssp
+    from .ssp_write import as_fmi3, for_omsimulator, write_ssp
 
     plan = plan_of_scenario(scenario, options)
     notes = list(map(str, plan.diagnostics))
@@ -172,5 +177,8 @@ def export_ssp(
     path = out or Path(f"{scenario.stem}.ssp")
     if for_ == "omsimulator":
         standard = standard or "1.0"  # which alone it reads
-    write_ssp(plan, path, standard, named=out is not None)
+    with tempfile.TemporaryDirectory(prefix="yawbench-") as folder:
+        if fmi == "3":
+            plan = as_fmi3(plan, Path(folder))
+        write_ssp(plan, path, standard, named=out is not None)
     say(f"{path}: {len(plan.instances)} instances, {len(plan.wires)} connections")

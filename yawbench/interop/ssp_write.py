@@ -33,7 +33,7 @@ from typing import Literal
 from lxml import etree
 from lxml.etree import SubElement, _Element
 
-from yawbench.fmus.archive import read_archive
+from yawbench.fmus.archive import open_fmu, read_archive
 from yawbench.fmus.fmu import Fmu, Value, Variable
 from yawbench.foundation.errors import ResultsError, WiringError
 from yawbench.foundation.messages import fold, listed
@@ -115,6 +115,24 @@ def write_ssp(plan: Plan, path: Path, standard: Version | None = None, *, named:
         ) from None
 
 
+def as_fmi3(plan: Plan, folder: Path) -> Plan:
+    """Return the plan with its FMUs of FMI 2.0 as FMI 3.0, which are written into a folder.
+
+    Raises:
+        BuildError: one was not built here, or has no native library.
+    """
+    from yawbench.fmus.fmi3_archive import convert
+
+    made: dict[str, Fmu] = {}
+    for fmu in (instance.fmu for instance in plan.instances if instance.fmu.fmi == 2):
+        if fmu.sha256 not in made:
+            place = folder / fmu.sha256[:8]
+            place.mkdir()
+            made[fmu.sha256] = replace(open_fmu(convert(fmu.path, place)), built=fmu.built)
+    instances = (replace(i, fmu=made.get(i.fmu.sha256, i.fmu)) for i in plan.instances)
+    return replace(plan, instances=tuple(instances))
+
+
 def _lost(plan: Plan) -> list[str]:
     """Return the variables that an archive would contain and SSP 1.0 cannot express."""
     return [
@@ -139,8 +157,8 @@ def _given(instance: Instance) -> dict[str, Value]:
 
 def _type(variable: Variable) -> str:
     """Return the type of a variable, as SSP 2.0 names it."""
-    plain = variable.type in ("Boolean", *UNREAD)
-    return variable.type if plain or variable.encoding is None else variable.encoding
+    plain = variable.fmi_type in ("Boolean", *UNREAD)
+    return variable.fmi_type if plain or variable.encoding is None else variable.encoding
 
 
 def _array(fmu: Fmu, variable: Variable) -> tuple[str, tuple[int, ...], list[Variable]]:
@@ -286,7 +304,7 @@ def _add_component(
             kind = SubElement(connector, f"{{{SSC}}}{_spelled_type(variable, standard)}")
             if variable.type == "Real" and variable.unit in spelled:
                 kind.set("unit", str(variable.unit))
-            elif variable.type == "Enumeration":
+            elif variable.fmi_type == "Enumeration":
                 of_items = f"{instance.name}.{name}"
                 enumerations[of_items] = variable.items or {}
                 kind.set("name", of_items)
@@ -304,7 +322,7 @@ def _add_component(
 
 
 def _spelled_type(variable: Variable, standard: Version) -> str:
-    return _type(variable) if standard == "2.0" else OLD_TYPES.get(_type(variable), variable.type)
+    return _type(variable) if standard == "2.0" else OLD_TYPES.get(_type(variable), variable.fmi_type)
 
 
 def _add_dimensions(above: _Element, shape: tuple[int, ...]) -> None:
@@ -324,7 +342,7 @@ def _add_values(
         parameter = SubElement(parameters, f"{{{SSV}}}Parameter", name=name)
         kind = SubElement(parameter, f"{{{SSV}}}{_spelled_type(variable, standard)}")
         texts = [_text(v, _value(v, values)) for v in elements]
-        if shape and variable.type in UNREAD:
+        if shape and variable.fmi_type in UNREAD:
             for text in texts:
                 SubElement(kind, f"{{{SSV}}}Value", value=text)
         else:
@@ -347,7 +365,7 @@ def _text(variable: Variable, value: Value) -> str:
         return "true" if value else "false"
     if variable.type == "Real":
         return repr(float(value))
-    if variable.type == "Enumeration":
+    if variable.fmi_type == "Enumeration" and not isinstance(value, str):
         return next((name for name, number in (variable.items or {}).items() if number == value), str(value))
     return str(value)
 

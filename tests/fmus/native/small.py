@@ -72,7 +72,7 @@ def compiled(text: str, folder: Path, optimization: str = "-O0") -> Path:
     (folder / "unit.c").write_text(text)
     for name, file in HEADERS.items():
         (folder / name).write_bytes(file.read_bytes())
-    command = [*compiler_command(), optimization, *FLAGS, "unit.c", "-o", "unit.so", "-lm"]
+    command = [*compiler_command(), optimization, "-fPIC", *FLAGS, "unit.c", "-o", "unit.so", "-lm"]
     subprocess.run(command, cwd=folder, check=True, stderr=subprocess.PIPE, text=True)
     return folder / "unit.so"
 

@@ -32,7 +32,7 @@ MEMBERS = {"c": "&c->of_{k}", "s": "&s->of_{k}"}
 def parts_of(text: str) -> tuple[str, str]:
     """Return the declarations of a program's variables, and its functions."""
     head, guid, rest = text.partition('#define GUID "{a}"\n')
-    return head + guid, rest.partition('#include "unit.h"')[0]
+    return head + guid, rest.partition('#include "fmi_unit.h"')[0]
 
 
 def together(programs: Sequence[str]) -> str:
@@ -70,7 +70,7 @@ def together(programs: Sequence[str]) -> str:
             passed = ", ".join(MEMBERS[x].format(k=k) if x in MEMBERS else x for x in names)
             lines.append(f"    case {k}: return {hook}_of_{k}({passed});")
         lines += ["    }", "    return 1;", "}"]
-    return "\n".join([*lines, '#include "unit.h"', ""])
+    return "\n".join([*lines, '#include "fmi_unit.h"', ""])
 
 
 def library_of(programs: Sequence[str], folder: Path, optimization: str) -> Path:
