@@ -28,10 +28,11 @@ from dataclasses import dataclass
 from math import exp
 
 from ..control_laws.moment_limit import LimitParameters
+from ..control_laws.phase_plane import beyond
 from ..control_laws.sideslip_bound import sideslip_bound
 from ..fmi.component import Component
 from ..fmi.variables import like, output, parameter
-from .dead_band import DeadBandParameters, beyond
+from .dead_band import DeadBandParameters
 
 OFF, OVERSTEER, UNDERSTEER = 0.0, 1.0, 2.0
 """Values of `stability_state`."""

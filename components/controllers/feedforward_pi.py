@@ -32,12 +32,13 @@ from ..cars.published_cars import PaperASingleTrack
 from ..cars.single_track_car import SingleTrackCar
 from ..control_laws.linear_feedback import error_dynamics
 from ..control_laws.moment_limit import LimitParameters, limit
+from ..control_laws.phase_plane import beyond
 from ..control_laws.saturating_axles import holding_moment
 from ..control_laws.sideslip_bound import sideslip_bound
 from ..fmi.component import Component
 from ..fmi.variables import like, output, parameter, signal
 from ..mathematics.pid_loop import Gains, Pid
-from .dead_band import DeadBandParameters, beyond
+from .dead_band import DeadBandParameters
 from .lqr import LqrParameters
 
 SEEN = ("yaw_rate_ref", "yaw_rate", "sideslip", "velocity_x", "friction", "steer_angle")
