@@ -172,7 +172,7 @@ def _read_back(
 def _took(variable: Variable, actual: Value, expected: Value) -> bool:
     if variable.type == "Real":
         return math.isclose(expected, actual, rel_tol=SINGLE)  # type: ignore[arg-type]
-    return expected == actual
+    return variable.encoded(expected) == actual
 
 
 def _shown(variable: Variable, value: Value) -> str:
