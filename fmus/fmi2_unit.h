@@ -79,17 +79,8 @@ FMI2(SetInteger, (fmi2Component c, const fmi2ValueReference r[], size_t n, const
 FMI2(GetBoolean, (fmi2Component c, const fmi2ValueReference r[], size_t n, fmi2Boolean values[]),
      VALUES(get_others(instance, BOOLEANS, "Boolean", r, n, values)))
 
-EXPORTED fmi2Status fmi2SetBoolean(fmi2Component c, const fmi2ValueReference r[], size_t n, const fmi2Boolean values[])
-{
-    Instance *instance = c;
-    const char *const call = "fmi2SetBoolean";
-    Status status = instance == NULL ? ERROR : VALUES(OK);
-    for (size_t i = 0; i < n && status == OK; i++) {
-        int value = values[i] != 0;
-        status = set_others(instance, BOOLEANS, "Boolean", r + i, 1, &value);
-    }
-    return (fmi2Status)status;
-}
+FMI2(SetBoolean, (fmi2Component c, const fmi2ValueReference r[], size_t n, const fmi2Boolean values[]),
+     VALUES(set_others(instance, BOOLEANS, "Boolean", r, n, values)))
 
 /* There are no variables of type String. */
 EXPORTED fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference r[], size_t n, fmi2String values[])

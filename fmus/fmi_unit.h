@@ -475,7 +475,7 @@ static Status set_others(Instance *instance, int kinds, const char *type, const 
     instance->now.content.stale = 1;
     for (size_t i = 0; i < n; i++) {
         Reference k = r[i] - instance->host.first;
-        *other_at(instance, k) = (int)((unsigned)values[i] - (unsigned)first_item(k));
+        *other_at(instance, k) = kinds == BOOLEANS ? values[i] != 0 : (int)((unsigned)values[i] - (unsigned)first_item(k));
     }
     return OK;
 }

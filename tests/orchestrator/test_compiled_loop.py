@@ -279,7 +279,8 @@ def test_without_a_compiler_the_loop_is_in_python(fmus, tmp_path, monkeypatch, c
     monkeypatch.setenv("YAWBENCH_CACHE", str(tmp_path / "cache"))
     load_compiled.cache_clear()
     try:
-        why = "no C compiler (no-such-compiler not found); name one in the environment variable CC"
+        why = "no C compiler (no-such-compiler not found); name one in the environment variable CC, or "
+        why += "'pip install yawbench[compiler]'"
         assert compiled_loop.missing_loop((0, 1, 1000), 10) == why
         (tmp_path / "s.yaml").write_text("stop_time: 1\nstep_size: 0.1\nunits:\n  a: {fmu: driver_sine}\n")
         out = tmp_path / "out"

@@ -182,6 +182,7 @@ class ThreatsSpec(StrictModel):
     published: PublishedSpec | None = Field(None, description="Results found before")
     cars: list[str] = Field(min_length=1, description="Names of cars in the ranking file")
     scenarios: dict[str, dict[str, str]] = Field({}, description="Car -> scenario -> scenario in its place")
+    without: list[str] = Field([], description="Entries of the ranking that are not judged")
     changes: dict[str, dict[TargetText, Scalar]] = Field({}, description="Car -> further overrides of its own")
     threats: dict[str, ThreatSpec] = Field(min_length=1, description="Name -> threat")
     settings: dict[str, SettingSpec] = Field(min_length=1, description="Name -> setting; the first ranks")
@@ -308,7 +309,15 @@ def load_threats(
         name: car.model_copy(update={"set": {**car.set, **spec.changes.get(name, {})}})
         for name, car in ranking.spec.cars.items()
     }
-    ranking = replace(ranking, spec=ranking.spec.model_copy(update={"cars": cars}))
+    for name in spec.without:
+        if name not in ranking.entries:
+            raise ScenarioError(
+                f"{path}: without: {ranking.path.name} has no entry {name!r}"
+                f"{hint(name, ranking.entries, lead='known')}",
+                code="entry-unknown",
+            )
+    judged = {name: entry for name, entry in ranking.entries.items() if name not in spec.without}
+    ranking = replace(ranking, spec=ranking.spec.model_copy(update={"cars": cars}), entries=judged)
     if REFERENCE not in ranking.entries:
         raise ScenarioError(
             f"{ranking.path}: has no entry {REFERENCE!r}, to which scores are relative", code="entry-unknown"
