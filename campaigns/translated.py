@@ -144,7 +144,9 @@ def drive(library: Path, component: type[Any], folder: Path, seed: int, starts: 
             for i in others:
                 v = variables[i]
                 value: Any = chance.randint(-3, 9) if v.type == "Integer" else chance.choice((True, False))
-                kind, own = ("Enumeration", chance.randint(1, len(v.choices))) if v.choices else (v.type, value)
+                kind, own = (
+                    ("Enumeration", chance.randint(1, len(v.choices))) if v.choices else (v.type, value)
+                )
                 pair.call("set", kind, [i], [own])
         pair.call("set", "Real", inputs, _inputs(chance)[: len(inputs)])
         if not (

@@ -350,6 +350,8 @@ def _parameters() -> Iterator[Parameter]:
              may={"lambda", "builtin"})  # fmt: skip
     yield of("export_fmu.file", lambda x: yb.export_fmu(Law(), x, role=SENTINEL))
     yield of("export_fmu.role", lambda x: yb.export_fmu(SENTINEL, "made.fmu", role=x))
+    yield of("export_fmu.fmi", lambda x: yb.export_fmu(Law(), "made.fmu", role=SENTINEL, fmi=x),
+             right={"three"})  # fmt: skip
     # Declarations.
     yield of("signal.name", lambda x: yb.signal(x), "signal")
     for name, right in (("unit", {"None"}), ("description", {"None"})):
@@ -378,6 +380,9 @@ def _parameters() -> Iterator[Parameter]:
                  right=(numbers | {"None"}))  # fmt: skip
     yield of("parameter.choices", lambda x: yb.parameter("a", None, "text", choices=x),
              right={"None", "pair of texts"})  # fmt: skip
+    yield of(
+        "parameter.tunable", lambda x: yb.parameter(1.0, "1", "text", tunable=x), right={"True", "False"}
+    )
     # Controllers in plain Python.
     numbers = (FINITE - {"1e308", "10**18"}) | {"list", "array of 1 dimension"}
     yield of("controller of a function, what it returns", lambda x: b.base.swap(

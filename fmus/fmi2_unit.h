@@ -91,11 +91,13 @@ EXPORTED fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference r[],
     for (size_t i = 0; i < n && status == OK; i++) {
         values[i] = "";
     }
-    return (fmi2Status)(n == 0 || status != OK ? status : get_others(instance, TEXTS, "String", r, 1, &(int){0}));
+    return (fmi2Status)(n == 0 || status != OK
+                            ? status
+                            : fail_of(instance, "reading", "String", r, n, r[0], "TypeError", " is not of type ", "String"));
 }
 
 FMI2(SetString, (fmi2Component c, const fmi2ValueReference r[], size_t n, const fmi2String values[]),
-     VALUES(n == 0 ? OK : set_others(instance, TEXTS, "String", r, 1, &(int){0})))
+     VALUES(set_others(instance, TEXTS, "String", r, n, NULL)))
 
 FMI2(GetFMUstate, (fmi2Component c, fmi2FMUstate *state), save(instance, call, state))
 FMI2(SetFMUstate, (fmi2Component c, fmi2FMUstate state), restore(instance, call, state))

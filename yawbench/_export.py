@@ -85,7 +85,7 @@ def export_fmu(
         )
     if arguments.names_file(controller):
         raise ScenarioError(f"controller: {short(controller)} is an FMU already", code="controller-invalid")
-    if fmi not in (2, 3):
+    if type(fmi) is not int or fmi not in (2, 3):
         raise ScenarioError(f"fmi: must be 2 or 3 (got {short(fmi)})", code="argument-invalid")
     with bar(f"Export {path.name}"):
         _write(controller, path, role, folders[role], Edition(fmi))

@@ -100,8 +100,8 @@ class Run:
 
         >>> run.events.headings
         ['time', 'until', 'event', 'where', 'value', 'limit', 'unit', 'signal']
-        >>> run.events.rows[0][2]
-        'steering'
+        >>> "intervention" in [event for _, _, event, *_ in run.events.rows]
+        True
         """
         from yawbench.studies.listings import events_table
 
@@ -119,6 +119,8 @@ class Run:
         from yawbench.events.kinds import events_in
         from yawbench.events.why import why
 
+        if best is not None and not isinstance(best, Run):
+            raise TypeError(f"best: must be a Run (got {short(best)})")
         beside = None if best is None else events_in(best.results)
         return [str(reason) for reason in why(events_in(self.results), beside)]
 

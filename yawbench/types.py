@@ -38,6 +38,7 @@ from yawbench.orchestrator.results.reader import Results
 from yawbench.orchestrator.results.run_record import RunRecord
 from yawbench.orchestrator.signal_names import SignalName, Target, TargetKind
 from yawbench.proving_ground.standard_tests import TestName
+from yawbench.studies.tables import Table
 
 from ._controller import ControllerLike, Numbers
 
@@ -66,6 +67,7 @@ __all__ = [
     "SignalName",
     "SourceKind",
     "Status",
+    "Table",
     "Target",
     "TargetKind",
     "TestName",

@@ -198,6 +198,7 @@ def parameter(
     if kind is None:
         known = ", ".join(kind.__name__ for kind in _FMI_TYPES)
         raise DeclarationError(f"parameter: default must be one of {known} (got {type(default).__name__})")
+    _check("parameter", "tunable", tunable, bool)
     if kind == "Real":
         _check("parameter", "default", default, float)
     elif tunable:

@@ -20,7 +20,9 @@ from yawbench.vocabulary.wheels import wheels
 def on_the_road(vehicle: str, **settings: object) -> Scenario:
     base = yb.load("proving_ground/sine_with_dwell_esc")
     change = Override.of("vehicle", str(SHIPPED / "vehicles" / f"{vehicle}.yaml"), "test")
-    return Scenario(base.path, (change,), base._programs).set({"step_size": 0.0025, **settings})
+    return Scenario(base.path, (change,), base._programs).set(
+        {"step_size": 0.0025, "wheel_control.step_size": 0.0025, **settings}
+    )
 
 
 @pytest.mark.parametrize("side", [1.0, pytest.param(-1.0, marks=pytest.mark.exhaustive)])

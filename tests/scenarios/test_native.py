@@ -24,7 +24,7 @@ RUNS = {
     "proving_ground/side_wind_gust": ("5 ms", {}),
     "proving_ground/sine_sweep": ("5 ms", {"controller": "controller_lqr"}),
     "proving_ground/sine_with_dwell": ("5 ms", {}),
-    "proving_ground/sine_with_dwell_esc": ("5 ms", {}),
+    "proving_ground/sine_with_dwell_esc": ("1 ms", {}),
     "proving_ground/sine_with_dwell_motors_split": ("2.5 ms", {"controller": "controller_gain_scheduled"}),
     "proving_ground/sine_with_dwell_sensors": ("2.5 ms", {"controller": "controller_phase_plane"}),
     "proving_ground/sine_with_dwell_split": ("2.5 ms", {"controller": "controller_steering_and_braking"}),

@@ -169,23 +169,6 @@ def test_the_sentence_on_bounds_has_how_far_they_lie_above_what_is_measured(page
     assert sentence_has(" ".join(page.split()), f"{min(above):.0f}", f"{max(above):.0f} %", "worst", "result")
 
 
-def test_the_figures_of_the_measured_car_are_those_of_its_page(page):
-    cars = (ROOT / "docs" / "measured_cars.md").read_text("utf-8").partition("**Estimators**")[2]
-    rows = {name: cells for name, *cells in table_in(cars)}
-    (observer, second), (kinematic, _), (zero, _) = (
-        next(cells for name, cells in rows.items() if word in name)
-        for word in ("`estimator_observer`", "`estimator_kinematic`", "constant zero")
-    )
-    rms, _, interval = observer.partition(" ")
-    text = " ".join(page.split())
-    assert sentence_has(text, rms, interval[1:-1], "observer", "errs")
-    assert sentence_has(text, second, "worst", "second")
-    assert sentence_has(text, zero, "constant", "zero")
-    assert sentence_has(text, kinematic, "kinematic", "estimator")
-    share = 1 - float(rms.removesuffix("°")) / float(zero.removesuffix("°"))
-    assert share == pytest.approx(1 / 3, abs=0.05)  # "removes about a third"
-
-
 @pytest.mark.exhaustive
 def test_the_page_on_real_signals_has_no_row_that_the_study_does_not_measure(tmp_path):
     with pytest.raises(SystemExit) as exit_:

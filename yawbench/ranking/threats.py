@@ -183,7 +183,9 @@ class ThreatsSpec(StrictModel):
     cars: list[str] = Field(min_length=1, description="Names of cars in the ranking file")
     scenarios: dict[str, dict[str, str]] = Field({}, description="Car -> scenario -> scenario in its place")
     without: list[str] = Field([], description="Entries of the ranking that are not judged")
-    changes: dict[str, dict[TargetText, Scalar]] = Field({}, description="Car -> further overrides of its own")
+    changes: dict[str, dict[TargetText, Scalar]] = Field(
+        {}, description="Car -> further overrides of its own"
+    )
     threats: dict[str, ThreatSpec] = Field(min_length=1, description="Name -> threat")
     settings: dict[str, SettingSpec] = Field(min_length=1, description="Name -> setting; the first ranks")
     disciplines: dict[str, DisciplineSpec] = Field(
