@@ -228,6 +228,7 @@ def _parameters() -> Iterator[Parameter]:
     progress = {"lambda of all", "builtin"}
     yield of("Scenario.run.progress", lambda x: b.base.run(progress=x), right={"None", *TRUTHS, *progress},
              skip={"builtin type method"})  # fmt: skip
+    yield of("Run.why.best", lambda x: b.run.why(x), right={"None"})
     yield of("Run.metric.name", lambda x: b.run.metric(x), "metric")
     yield of("Run.metric.window", lambda x: b.run.metric("peak(sideslip)", x), "window", "the run lasts",
              right={"None"})  # fmt: skip

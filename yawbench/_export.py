@@ -79,14 +79,14 @@ def export_fmu(
             f"file: must be a name of letters, digits and _ that ends with .fmu (got {path.name!r})",
             code="argument-invalid",
         )
+    if type(fmi) is not int or fmi not in (2, 3):
+        raise ScenarioError(f"fmi: must be 2 or 3 (got {short(fmi)})", code="argument-invalid")
     if role not in folders:
         raise ScenarioError(
             f"role: must be one of {listed(folders, last='or')} (got {short(role)})", code="argument-invalid"
         )
     if arguments.names_file(controller):
         raise ScenarioError(f"controller: {short(controller)} is an FMU already", code="controller-invalid")
-    if type(fmi) is not int or fmi not in (2, 3):
-        raise ScenarioError(f"fmi: must be 2 or 3 (got {short(fmi)})", code="argument-invalid")
     with bar(f"Export {path.name}"):
         _write(controller, path, role, folders[role], Edition(fmi))
     return path

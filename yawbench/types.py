@@ -38,13 +38,15 @@ from yawbench.orchestrator.results.reader import Results
 from yawbench.orchestrator.results.run_record import RunRecord
 from yawbench.orchestrator.signal_names import SignalName, Target, TargetKind
 from yawbench.proving_ground.standard_tests import TestName
-from yawbench.studies.tables import Table
+from yawbench.studies.tables import Cell, Column, Kind, Table
 
 from ._controller import ControllerLike, Numbers
 
 __all__ = [
     "BuildInfo",
     "Causality",
+    "Cell",
+    "Column",
     "ControllerLike",
     "Fault",
     "FaultList",
@@ -55,6 +57,7 @@ __all__ = [
     "Given",
     "InputSeries",
     "Instance",
+    "Kind",
     "Messages",
     "Numbers",
     "OriginKind",

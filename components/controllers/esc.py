@@ -127,7 +127,7 @@ class EscController(Component):
     outputs = (
         output("yaw_moment", *SEEN),
         "engine_reduction",
-        "brake_preparation",
+        output("brake_preparation", *SEEN),
         output("stability_state", unit="1", text="State of the supervisor: 0 off, 1 oversteer, 2 understeer"),
         output("sideslip_excess", *SEEN, unit="rad", text="Sideslip, foreseen, beyond its bound"),
     )

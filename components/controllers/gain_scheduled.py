@@ -95,7 +95,9 @@ class GainScheduled(Component):
     outputs = (
         output("yaw_moment", *SEEN),
         output("added_steer_angle_request", *SEEN),
-        output("scheduling", *SEEN, unit="1", text="Scheduling variable rho"),
+        output(
+            "scheduling", "sideslip", "sideslip_rate", "friction", unit="1", text="Scheduling variable rho"
+        ),
     )
 
     def start(self, t: float, u: list[float]) -> None:

@@ -66,7 +66,12 @@ class Lqg(Component):
     inputs = SEEN
     outputs = (
         output("yaw_moment", *SEEN),
-        output("estimated_sideslip", *SEEN, unit="rad", text="Sideslip angle of the law's own filter"),
+        output(
+            "estimated_sideslip",
+            *(name for name in SEEN if not name.endswith("_ref")),
+            unit="rad",
+            text="Sideslip angle of the law's own filter",
+        ),
     )
 
     def configure(self) -> None:

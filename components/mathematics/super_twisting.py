@@ -48,9 +48,11 @@ class SuperTwisting:
 
         Args:
             s: sliding variable.
-            h: length of the sample > 0 [s].
+            h: length of the sample [s]; 0: nothing moves.
             low, high: limits of u: beyond them the integral only moves back.
         """
+        if h <= 0.0:
+            return self.integral
         growth = h * self.k_2
         sigma = min(max(s / (h * growth), -1.0), 1.0)
         half = 0.5 * h * self.k_1

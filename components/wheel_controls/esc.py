@@ -140,6 +140,8 @@ class EscBrakes(Component):
         self.master = self._master(u[28])
 
     def advance(self, t: float, h: float, u: list[float]) -> None:
+        if h <= 0.0:
+            return
         p = self.p
         self.master = self._master(u[28])
         self._heat(h, u)

@@ -82,6 +82,8 @@ def _enumeration(variable: Variable, raw: Value) -> int:
 def _other(variable: Variable, raw: Value) -> Value:
     if variable.type == "Boolean" and not isinstance(raw, bool):
         raise ValueError(f"must be true or false (got {short(raw)})")
+    if variable.items is not None and type(raw) is int:
+        raw = next((name for name, number in variable.items.items() if number == raw), raw)
     if variable.type == "String" and not isinstance(raw, str):
         raise ValueError(f"must be text (got {short(raw)}): put it in quotes")
     return raw

@@ -32,8 +32,10 @@ class Unit:
         self.variables = component.variables
         reference = {v.name: i for i, v in enumerate(self.variables)}
         for name, value in parameters.items():
-            kind = self.variables[reference[name]].type.lower()
-            getattr(self.slave, f"set_{kind}")([reference[name]], [value])
+            variable = self.variables[reference[name]]
+            kind = variable.fmi_type.replace("Enumeration", "Integer").lower()
+            number = variable.choices.index(value) + 1 if variable.fmi_type == "Enumeration" else value
+            getattr(self.slave, f"set_{kind}")([reference[name]], [number])
         self.inputs = [v.name for v in self.variables if v.causality == "input"]
         outputs = [v for v in self.variables if v.causality == "output"]
         self.outputs = [v.name for v in outputs]

@@ -18,7 +18,9 @@ class Stand:
     def __init__(self, component: type[Component], **parameters: Any) -> None:
         self.unit = component(instance_name="stand", resources=None)
         self.reference = {v.name: i for i, v in enumerate(component.variables)}
-        self.type = {v.name: v.type.lower() for v in component.variables}
+        kinds = {v.name: v.fmi_type.replace("Enumeration", "Integer") for v in component.variables}
+        self.type = {name: kind.lower() for name, kind in kinds.items()}
+        self.choices = {v.name: v.choices for v in component.variables if v.fmi_type == "Enumeration"}
         self.setters = {kind: getattr(self.unit, f"set_{kind}") for kind in {*self.type.values()}}
         self.answers = {v.name: i for i, v in enumerate(component.variables) if v.causality == "output"}
         self.time = 0.0
@@ -28,7 +30,8 @@ class Stand:
         for kind, setter in self.setters.items():
             names = [name for name in values if self.type[name] == kind]
             if names:
-                setter([self.reference[name] for name in names], [values[name] for name in names])
+                given = [self._number(name, values[name]) for name in names]
+                setter([self.reference[name] for name in names], given)
         self._check()
 
     def start(self, **inputs: float) -> dict[str, float]:
@@ -52,7 +55,14 @@ class Stand:
 
     def __getitem__(self, name: str) -> Any:
         getter = getattr(self.unit, f"get_{self.type[name]}")
-        return getter([self.reference[name]])[0]
+        value = getter([self.reference[name]])[0]
+        return self.choices[name][value - 1] if name in self.choices else value
+
+    def _number(self, name: str, value: Any) -> Any:
+        """Return a value as a host gives it: of a choice its number, 0 if there is no such choice."""
+        if name not in self.choices or not isinstance(value, str):
+            return value
+        return self.choices[name].index(value) + 1 if value in self.choices[name] else 0
 
     def _check(self) -> None:
         messages = [m.msg for m in self.unit.log_queue if m.status >= 3]

@@ -57,6 +57,8 @@ def test_the_file_leaves_nothing_of_the_car_to_defaults(name, plant, others):
     numerics = {"low_speed", "slip_stiffness_per_load"}
     implied = {"front_unsprung_share", "sprung_roll_yaw_product"}  # equal wheels, principal axes
     implied |= {"roll_camber_front", "roll_camber_rear"}  # of tyres that take camber, as the paper's do not
+    implied |= {"slip_angle_relaxation"}  # these are off
+    implied |= {f"{what}_{axle}" for what in ("roll_steer", "steer_stiffness") for axle in ("front", "rear")}
     assert parameters(plant) - set(load(name)) <= choices_of_the_run | numerics | implied
 
 

@@ -9,7 +9,11 @@ import pytest
 import yawbench as yb
 
 SWD = "proving_ground/sine_with_dwell"
-LATE_RELEASE = {"wheel_control.release_slip": 0.2, "wheel_control.full_release_slip": 0.4}
+LATE_RELEASE = {
+    "wheel_control.release": "slip",
+    "wheel_control.release_slip": 0.2,
+    "wheel_control.full_release_slip": 0.4,
+}
 
 
 class Proportional:

@@ -20,6 +20,7 @@ TYPES: dict[str, Any] = {
     "Integer": ctypes.c_int,
     "Boolean": ctypes.c_int,
     "String": ctypes.c_char_p,
+    "Enumeration": ctypes.c_int,
 }
 LOGGER = ctypes.CFUNCTYPE(
     None, ctypes.c_void_p, ctypes.c_char_p, ctypes.c_int, ctypes.c_char_p, ctypes.c_char_p
@@ -48,12 +49,19 @@ class Fmu:
         self.type: dict[str, str] = {}
         self.causality: dict[str, str] = {}
         self.start: dict[str, str | None] = {}
+        self.items: dict[str, list[str]] = {}
+        declared = {
+            simple.get("name"): [item.get("name") or "" for item in simple.iter("Item")]
+            for simple in root.iter("SimpleType")
+        }
         for element in root.iter("ScalarVariable"):
             name = element.get("name") or ""
             self.reference[name] = int(element.get("valueReference") or 0)
             self.causality[name] = element.get("causality") or ""
             self.type[name] = element[0].tag
             self.start[name] = element[0].get("start")
+            if element[0].tag == "Enumeration":
+                self.items[name] = declared[element[0].get("declaredType")]
         names = list(self.reference)
         self.depends: dict[str, set[str]] = {}
         for element in root.iterfind("ModelStructure/Outputs/Unknown"):
@@ -126,14 +134,26 @@ class Unit:
     def set(self, **values: Any) -> None:
         for kind, ctype in TYPES.items():
             names = [name for name in values if self.fmu.type[name] == kind]
-            given = [values[name].encode() if kind == "String" else values[name] for name in names]
+            given = [self._given(kind, name, values[name]) for name in names]
             if names:
-                self.do(f"fmi2Set{kind}", self._references(names), _n(names), (ctype * len(names))(*given))
+                function = f"fmi2Set{kind.replace('Enumeration', 'Integer')}"
+                self.do(function, self._references(names), _n(names), (ctype * len(names))(*given))
+
+    def _given(self, kind: str, name: str, value: Any) -> Any:
+        if kind == "Enumeration" and isinstance(value, str):
+            return self.fmu.items[name].index(value) + 1
+        return value.encode() if kind == "String" else value
 
     def get(self, *names: str) -> list[Any]:
-        values = (TYPES[self.fmu.type[names[0]]] * len(names))() if names else None
+        """Return values of one type; of an Enumeration the names of its items."""
+        kind = self.fmu.type[names[0]] if names else ""
+        values = (TYPES[kind] * len(names))() if names else None
         if names:
-            self.do(f"fmi2Get{self.fmu.type[names[0]]}", self._references(names), _n(names), values)
+            function = f"fmi2Get{kind.replace('Enumeration', 'Integer')}"
+            self.do(function, self._references(names), _n(names), values)
+        if kind == "Enumeration":
+            chosen = zip(names, values or (), strict=True)
+            return [self.fmu.items[name][value - 1].encode() for name, value in chosen]
         return list(values or ())
 
     def outputs(self) -> list[float]:

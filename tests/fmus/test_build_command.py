@@ -25,8 +25,9 @@ def run(*arguments):
 def test_it_builds_what_is_named_and_says_so_on_stderr(tmp_path):
     done = run("controller_off", "driver_sine", "--out", tmp_path)
     assert (done.exit_code, done.stdout) == (0, "")
+    said = "\n".join(line for line in done.stderr.splitlines() if "library for Windows" not in line)
     assert each_mentions(
-        done.stderr, ("controller_off", "built"), ("driver_sine", "built"), ("driver_sine", "never compared")
+        said, ("controller_off", "built"), ("driver_sine", "built"), ("driver_sine", "never compared")
     )
     assert {file.name for file in tmp_path.iterdir()} == {"controller_off.fmu", "driver_sine.fmu"}
 
@@ -41,8 +42,9 @@ class Backwards(Pool):
 def test_it_names_what_is_built_in_the_order_asked_for_whichever_takes_longer(tmp_path, monkeypatch):
     monkeypatch.setattr("yawbench.fmus.build.Pool", Backwards)
     done = run("controller_off", "driver_sine", "--out", tmp_path)
+    said = "\n".join(line for line in done.stderr.splitlines() if "library for Windows" not in line)
     assert each_mentions(
-        done.stderr, ("controller_off", "built"), ("driver_sine", "built"), ("driver_sine", "never compared")
+        said, ("controller_off", "built"), ("driver_sine", "built"), ("driver_sine", "never compared")
     )
 
 

@@ -53,6 +53,8 @@ def codes_of(tree: ast.AST) -> set[str]:
             given = [key.value for key in node.keywords if key.arg == "code"]
             if name in MAKERS or name.endswith("Error"):
                 given += [one for one in node.args if isinstance(one, ast.Constant) and "-" in str(one.value)]
+            if name == "EventKind" and any(key.arg == "warning" for key in node.keywords):
+                given += [node.args[0]]
             found |= texts_in(given)
         elif isinstance(node, ast.Assign) and {getattr(to, "id", "") for to in node.targets} & NAMES:
             values = node.value.values if isinstance(node.value, ast.Dict) else [node.value]

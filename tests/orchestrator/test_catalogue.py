@@ -75,7 +75,7 @@ def test_the_library_knows_the_names_that_the_commands_know(tmp_path, monkeypatc
         ("study", SCENARIOS / "fuzzy_sliding_mode", ["a folder, not a study file", "/distribution.yaml"]),
         ("sweep", SCENARIOS / "fnn_sideslip", ["a folder, not a sweep file", "/sweep_slip_control.yaml"]),
         ("sweep", SCENARIOS / "fuzzy_pid", ["a folder without a sweep file", "'yawbench run' takes"]),
-        ("run", SCENARIOS / "vehicles", ["a folder without a scenario", "name", ": feedforward_pi/step_steer"]),
+        ("run", SCENARIOS / "vehicles", ["a folder without a scenario", ": feedforward_pi/step_steer"]),
     ],
 )  # fmt: skip
 def test_a_folder_in_place_of_a_file_names_the_files_in_it(yawbench, command, folder, expected):

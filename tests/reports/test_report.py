@@ -366,16 +366,16 @@ def test_the_four_papers_are_found_in_their_order_and_what_goes_beyond_them_afte
         "real_signals/blind_estimators.yaml",
         "real_signals/faults.yaml",
         "real_signals/degradation.yaml",
+        "weighted_least_squares/study.yaml",
         "lqg/study.yaml",
-        "internal_model/study.yaml",
         "super_twisting/study.yaml",
+        "internal_model/study.yaml",
         "feedforward_pi/study.yaml",
         "steering_and_braking/study.yaml",
         "integral_sliding_mode/study.yaml",
         "gain_scheduled/study.yaml",
         "envelope_mpc/study.yaml",
         "phase_plane/study.yaml",
-        "weighted_least_squares/study.yaml",
     ]
 
 

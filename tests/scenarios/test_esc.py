@@ -11,7 +11,7 @@ import yawbench as yb
 from yawbench._scenario import Scenario
 from yawbench.metrics.verdict import Status
 from yawbench.orchestrator.plan import Override
-from yawbench.orchestrator.scenario.loader import SHIPPED
+from yawbench.orchestrator.scenario.catalogue import SHIPPED
 from yawbench.proving_ground.sine_with_dwell import evaluate_dwell
 from yawbench.proving_ground.trace import trace_of
 from yawbench.vocabulary.wheels import wheels

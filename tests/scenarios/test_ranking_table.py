@@ -10,9 +10,8 @@ import pytest
 
 from docs.generate import matrix_tables
 from tests.command_line import status_of
-from tests.refusals import sentence_has
 from yawbench.ranking.ranking import ConditionSpec, load_ranking
-from yawbench.ranking.ranking_scores import EntryScore, RankedState, RankingResult, run_ranking
+from yawbench.ranking.ranking_scores import EntryScore, RankingResult, run_ranking
 from yawbench.studies.executor import Executor, runner_of
 
 RANKING = load_ranking(matrix_tables.FILE)
@@ -61,80 +60,6 @@ def test_the_published_cells_are_in_the_order_of_the_ranking(published):
     with matrix_tables.RUNS.open(encoding="utf-8", newline="") as lines:
         order = list(dict.fromkeys(row["entry"] for row in csv.DictReader(lines)))
     assert order == [score.entry for score in published.scores]
-
-
-def test_the_conclusions_on_passes_are_those_of_the_table(published, by_name, conclusions):
-    tuned = [
-        len(passed(score))
-        for score in published.scores
-        if score.spec.gains == "tuned" and score.spec.fmu not in BY_SIDESLIP
-    ]
-    assert len(tuned) == 8
-    assert sentence_has(
-        conclusions,
-        between(tuned, 0),
-        f"{len(published.ranking.conditions)} conditions",
-        "pass",
-        "conditions",
-    )
-    (few,) = {len(passed(by_name[name])) for name in ("pid", "lqr", "mpc")}
-    assert sentence_has(conclusions, few, "LQR", "predictive")
-    alike = [score for score in published.scores if passed(score) == passed(published.scores[1])]
-    assert [score.rank for score in alike] == [*range(2, 2 + len(alike))]
-    assert sentence_has(conclusions, alike[-1].rank, f"{len(passed(alike[0]))} conditions", "2", "Rows")
-    assert {"sliding_mode", "fuzzy_sliding_mode", "fuzzy_feedback"} <= {score.entry for score in alike}
-    assert sentence_has(conclusions, len(passed(by_name["dead_band"])), "passes", "gains")
-    whole = {name for name, score in by_name.items() if "hard" in passed(score)}
-    assert whole.isdisjoint({"fuzzy_sideslip", "fuzzy_sideslip_tuned"})
-    still = sum("hard_sensors" in passed(by_name[name]) for name in whole)
-    cost = [slides(by_name[name], "hard_sensors") - slides(by_name[name], "hard") for name in whole]
-    assert sentence_has(conclusions, f"{len(whole)} entries", f"{between(cost)}°", "`hard`", "cost")
-    assert sentence_has(conclusions, still, "pass")
-    assert [score.spec.fmu for score in published.scores[-3:]] == [BY_SIDESLIP[1]] * 2 + [BY_SIDESLIP[2]]
-
-
-def test_the_conclusions_on_conditions_are_those_of_the_table(published):
-    passing = {
-        name: {score.entry for score in published.scores if name in passed(score)}
-        for name in RANKING.conditions
-    }
-    assert passing["hard_unknown"] == {"fuzzy_sideslip_tuned"}
-    assert passing["saloon75_unknown"] == {"fuzzy_sideslip", "fuzzy_sideslip_tuned", "dead_band"}
-    assert passing["hard_slow"] == passing["hard_split"] == set()
-    by_yaw_rate = {score.entry for score in published.scores if score.spec.fmu not in BY_SIDESLIP}
-    assert by_yaw_rate <= passing["saloon75_slow"]
-    split = {score.cells["hard_split"].state for score in published.scores}
-    assert split == {RankedState.SPUN, RankedState.FAILED}
-
-
-def test_the_conclusions_on_sideslip_and_effort_are_those_of_the_table(published, by_name, conclusions):
-    alike = [score for score in published.scores if passed(score) == passed(published.scores[1])]
-    means = [math.degrees(score.mean("sideslip")) for score in alike]
-    assert sentence_has(conclusions, f"{max(means) - min(means):.1f}°", "peak", "sideslip")
-    late = by_name["sliding_mode_tuned"]
-    worn, heavy = ([slides(score, f"hard_{word}") for score in alike] for word in ("worn", "heavy"))
-    assert sentence_has(
-        conclusions,
-        f"{between(worn)}°",
-        f"{between(heavy)}°",
-        f"{len(passed(late))} conditions",
-        late.rank,
-        f"{slides(late, 'hard_worn'):.1f}°",
-        f"{slides(late, 'hard_heavy'):.1f}°",
-        "20 %",
-        "worn",
-    )
-    band = by_name["dead_band"]
-    further = [slides(band, "hard") - slides(by_name[name], "hard") for name in MODES]
-    assert sentence_has(conclusions, f"{between(further)}°", "`hard`", "slides")
-    chatter = [100 * band.mean("chatter") / by_name[name].mean("chatter") for name in MODES]
-    assert sentence_has(conclusions, f"{between(chatter, 0)} %", "chatter")
-    rivals = [score for score in published.scores if score.spec.fmu not in BY_SIDESLIP and score is not band]
-    assert all(score.mean("intervention") > band.mean("intervention") for score in rivals)
-    cheap = [
-        s for s in published.scores if s is not band and s.mean("intervention") <= band.mean("intervention")
-    ]
-    assert all(score.mean("headroom") < band.mean("headroom") for score in cheap)
 
 
 @pytest.mark.exhaustive
