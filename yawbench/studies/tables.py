@@ -46,6 +46,7 @@ RULE = "─"
 Cell = str | MetricValue | float | None
 """A table cell: text, a number with its unit or in that of its column, or None if empty."""
 Kind = Literal["int64", "float64", "string"]
+"""Kind of the cells of a column, for data frames and files."""
 
 
 @dataclass(frozen=True)
