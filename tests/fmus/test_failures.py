@@ -103,7 +103,7 @@ def test_the_traceback_is_logged_for_those_who_ask(failing, sample):
         ("recent", "call", "Traceback"),
         ("yawbench_", "line 206", "enter_initialization_mode"),
         ("self._configure",),
-        ("yawbench_", "line 229", "_configure"),
+        ("yawbench_", "line 245", "_configure"),
         ("self.configure",),
         ("failing.py", "line 71"),
         ("self._fail_in", '"configure"'),
