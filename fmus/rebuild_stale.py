@@ -80,7 +80,7 @@ class FmuUpdater:
     def _key(self, archive: Path, stamp: BuildStamp) -> str | None:
         """Return the key that the FMU would have if built now, None if its source does not exist."""
         entry = content_digest(str(archive).encode())
-        about = asdict(replace(stamp, key=""))
+        about = json.loads(json.dumps(asdict(replace(stamp, key=""))))  # as it reads back: lists for tuples
         record = json.loads(recall(KEYS, entry) or b"{}")
         if record.get("of") == about and self._digests.confirm(record["evidence"]):
             known: str | None = record["key"]
