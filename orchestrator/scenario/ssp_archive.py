@@ -1,6 +1,7 @@
 """SSP archives: their members, and components and connections, with nested systems flattened.
 
-Nothing is unpacked to disk, and references outside of the archive are refused. An archive may have several
+Nothing is unpacked to disk, and references outside of the archive, or of the folder of a description on its
+own, are refused. An archive may have several
 descriptions, variants of a system: `SystemStructure.ssd` is the default, another is named as if the archive
 were a folder, `system.ssp/other.ssd`.
 
@@ -105,7 +106,8 @@ class SspArchive:
     """An SSP archive, read into memory.
 
     Args:
-        path: of the archive, or of a description in it, `system.ssp/other.ssd`.
+        path: of the archive, or of a description in it, `system.ssp/other.ssd`. A description in a folder is
+            read with the files of that folder.
         what: kind of the file, for messages.
 
     Raises:
@@ -119,13 +121,12 @@ class SspArchive:
         """Name of the member that describes the system."""
         self.root = "." if inside else self.path.name
         """Path of the archive, from the folder of `path`."""
-        if inside and self.path.is_dir():
+        self._variables: dict[str, dict[str, SspVariable]] = {}
+        self._folder = inside and self.path.is_dir()
+        if self._folder:
             if not path.exists():
                 raise SspError("no such file", code="file-missing")
-            raise SspError(
-                "an .ssd file is read inside its archive: pack its folder as an .ssp file and give that",
-                code="file-wrong-kind",
-            )
+            return
         try:
             raw = read_bytes(self.path, largest=PACKED)
         except FileNotFoundError:
@@ -139,12 +140,27 @@ class SspArchive:
             raise SspError(f"cannot read this {what}: {error}", code="file-unreadable") from None
         except _DAMAGE as error:
             raise SspError(f"no {what}, or damaged: {error}") from None
-        self._variables: dict[str, dict[str, SspVariable]] = {}
+
+    def _has(self, member: str) -> bool:
+        return (self.path / member).is_file() if self._folder else member in self._members
+
+    def _read(self, member: str, largest: int) -> bytes:
+        """Return the content of a member.
+
+        Raises:
+            ValueError: it is too large.
+        """
+        if self._folder:
+            return read_bytes(self.path / member, largest=largest)
+        if self._members[member].file_size > largest:
+            raise ValueError(f"it is larger than {largest // 10**6} MB")
+        return self._archive.read(self._members[member])
 
     def variants(self) -> dict[str, str]:
         """Return the descriptions in the archive, with their names: member -> name."""
         names = {}
-        for member in self._members:
+        members = [file.name for file in sorted(self.path.iterdir())] if self._folder else self._members
+        for member in members:
             if "/" not in member and member.lower().endswith(".ssd"):
                 try:
                     names[member] = self.xml(member, f"{{{SSD}}}SystemStructureDescription").get("name", "")
@@ -180,16 +196,14 @@ class SspArchive:
         Raises:
             SspError: the member is missing or damaged, or its root is not a `tag`.
         """
-        if member not in self._members:
+        if not self._has(member):
             raise SspError(f"no SSP archive, or not all of it: {self._lacks(member)}")
         try:
-            if self._members[member].file_size > LARGEST:
-                raise SspError(f"{member} is larger than {LARGEST // 10**6} MB")
-            root = etree.fromstring(self._archive.read(self._members[member]), _parser(), base_url=member)
+            root = etree.fromstring(self._read(member, LARGEST), _parser(), base_url=member)
         except etree.XMLSyntaxError as error:
             raise SspError(f"{member} is not well-formed: {error.msg}") from None
-        except _DAMAGE as error:
-            raise SspError(f"{member} is damaged: {error}") from None
+        except (OSError, *_DAMAGE) as error:
+            raise SspError(f"{member} cannot be read: {error}") from None
         if root.tag != tag:
             raise SspError(f"{member} is not a {etree.QName(tag).localname} of SSP 1.0 or 2.0")
         check_version(root)
@@ -197,7 +211,9 @@ class SspArchive:
 
     def _lacks(self, member: str) -> str:
         """Return what the archive has in place of a missing member."""
-        others = [] if member in self._members else [n for n in self.variants() if n != member]
+        if self._folder:
+            return f"there is no {member} beside {self.description}"
+        others = [n for n in self.variants() if n != member]
         if member == self.description and others:
             return f"there is no {member}; it has {listed(others)}, run as {self.path}/{others[0]}"
         if member == self.description:
@@ -211,13 +227,13 @@ class SspArchive:
             SspError: the FMU is not in the archive.
         """
         if member not in self._variables:
-            if member not in self._members:
+            if not self._has(member):
                 raise SspError(f"there is no {member} in the archive", component)
             try:
-                with zipfile.ZipFile(io.BytesIO(self._archive.read(self._members[member]))) as fmu:
+                with zipfile.ZipFile(io.BytesIO(self._read(member, PACKED))) as fmu:
                     content = fmu.read(members(fmu)["modelDescription.xml"])
                     description = etree.fromstring(content, _parser())
-            except (KeyError, *_DAMAGE, etree.XMLSyntaxError):
+            except (KeyError, OSError, *_DAMAGE, etree.XMLSyntaxError):
                 description = etree.Element("none")
             self._variables[member] = dict(_declared(description))
         return self._variables[member]
