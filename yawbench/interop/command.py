@@ -1,4 +1,4 @@
-"""`yawbench second-opinion` and `yawbench export-ssp`: run a scenario in other masters; export it as SSP."""
+"""`yawbench second-opinion`, `export-ssp`, `export-fmu`: a scenario in other masters, as SSP, as one FMU."""
 
 from __future__ import annotations
 
@@ -181,4 +181,31 @@ def export_ssp(
         if fmi == "3":
             plan = as_fmi3(plan, Path(folder))
         write_ssp(plan, path, standard, named=out is not None)
+    say(f"{path}: {len(plan.instances)} instances, {len(plan.wires)} connections")
+
+
+FmuOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--out", metavar="FILE", help="FMU to write. Default: <scenario>.fmu in the working directory."
+    ),
+]
+
+
+@takes(*CHANGES, "fmus", "no_build")
+def export_fmu(scenario: ScenarioFile, options: RunOptions, out: FmuOption = None) -> None:
+    """Write a scenario as one FMU of FMI 2.0.
+
+    Its units are stepped together inside, with the algorithm `jacobi`. Parameters and recorded outputs are
+    those of the units, named `instance.variable`. Needs the package fmu-manipulation-toolbox.
+    """
+    from .one_fmu import write_one_fmu
+
+    plan = plan_of_scenario(scenario, options)
+    path = out or Path(f"{scenario.stem}.fmu")
+    notes = [*map(str, plan.diagnostics), *write_one_fmu(plan, path, named=out is not None)]
+    if plan.faults:
+        notes.append(f"faults are not part of the FMU: {_faults_of(plan)}")
+    for note in notes:
+        say(f"note: {note}")
     say(f"{path}: {len(plan.instances)} instances, {len(plan.wires)} connections")
