@@ -169,6 +169,30 @@ def test_the_command_exports_and_run_runs_what_it_exports(fmus, tmp_path, monkey
     assert numbers[0] == numbers[1]
 
 
+def test_an_archive_for_libcosim_has_choices_as_numbers_and_gives_the_same_bits(fmus, tmp_path):
+    plan = plan_of(SCENARIOS / "fuzzy_feedback/single_sine.yaml", fmus)
+    out = tmp_path / "s.ssp"
+    with pytest.raises(SystemExit) as exit_:
+        main(
+            [
+                "export-ssp",
+                str(plan.scenario["file"]),
+                "--fmus",
+                str(fmus),
+                "--for",
+                "libcosim",
+                "--out",
+                str(out),
+            ]
+        )
+    assert not exit_.value.code
+    again = plan_of(out, fmus)
+    (reference,) = (i for i in again.instances if i.name == "reference")
+    assert (reference.parameters["mode"], reference.fmu.variables["mode"].type) == (2, "Integer")
+    assert not described(out).findall(".//{*}Enumeration")
+    assert results_of(again, tmp_path / "a") == results_of(plan, tmp_path / "b")
+
+
 def test_units_of_an_archive_are_swapped_and_set_as_those_of_a_scenario(feedback, fmus, tmp_path):
     swapped = plan_of(
         feedback, fmus, swaps=["controller=controller_off"], settings=["plant.initial_speed=80 km/h"]

@@ -145,8 +145,10 @@ Version = Annotated[
     typer.Option("--fmi", help="Version of FMI of the FMUs; 3 is for native ones that were built here."),
 ]
 For = Annotated[
-    Literal["all", "omsimulator"],
-    typer.Option("--for", help="Omit what OMSimulator does not support, and list it."),
+    Literal["all", "libcosim", "omsimulator"],
+    typer.Option(
+        "--for", help="Write choices as numbers; omit what OMSimulator does not support, and list it."
+    ),
 ]
 
 
@@ -163,23 +165,25 @@ def export_ssp(
 
     SSP: System Structure and Parameterization. `yawbench run` accepts the archive and gives the same numbers.
     """
-    from .ssp_write import as_fmi3, for_omsimulator, write_ssp
+    from .ssp_write import as_fmi3, for_omsimulator, with_numbers, write_ssp
 
     plan = plan_of_scenario(scenario, options)
     notes = list(map(str, plan.diagnostics))
     if plan.faults:
         notes.append(f"faults are not part of the archive: {_faults_of(plan)}")
-    if for_ == "omsimulator":
-        plan, more = for_omsimulator(plan)
-        notes += more
-    for note in notes:
-        say(f"note: {note}")
     path = out or Path(f"{scenario.stem}.ssp")
-    if for_ == "omsimulator":
-        standard = standard or "1.0"  # which alone it reads
+    if for_ != "all":
+        standard = standard or "1.0"  # which alone they read
     with tempfile.TemporaryDirectory(prefix="yawbench-") as folder:
         if fmi == "3":
             plan = as_fmi3(plan, Path(folder))
+        if for_ != "all":
+            plan = with_numbers(plan, Path(folder))
+        if for_ == "omsimulator":
+            plan, more = for_omsimulator(plan)
+            notes += more
+        for note in notes:
+            say(f"note: {note}")
         write_ssp(plan, path, standard, named=out is not None)
     say(f"{path}: {len(plan.instances)} instances, {len(plan.wires)} connections")
 
