@@ -45,6 +45,7 @@ PARAMETER_SET = "scenario"
 SSD = "http://ssp-standard.org/SSP1/SystemStructureDescription"
 SSC = "http://ssp-standard.org/SSP1/SystemStructureCommon"
 SSV = "http://ssp-standard.org/SSP1/SystemStructureParameterValues"
+SSB = "http://ssp-standard.org/SSP1/SystemStructureSignalDictionary"
 SSM = "http://ssp-standard.org/SSP1/SystemStructureParameterMapping"
 OSP = "http://opensimulationplatform.com/SSP/OSPAnnotations"
 OMS = "https://raw.githubusercontent.com/OpenModelica/OMSimulator/master/schema/oms.xsd"
@@ -56,6 +57,7 @@ and libcosim mistakes a declaration further down for content."""
 FMU_TYPE = "application/x-fmu-sharedlibrary"
 VALUES_TYPE = "application/x-ssp-parameter-set"
 MAPPING_TYPE = "application/x-ssp-parameter-mapping"
+DICTIONARY_TYPE = "application/x-ssp-signal-dictionary"
 
 OSP_ANNOTATION = "com.opensimulationplatform"
 OMS_ANNOTATION = "org.openmodelica"
@@ -209,6 +211,28 @@ class SspArchive:
         check_version(root)
         return root
 
+    def content(self, element: _Element, inside: str, tag: str, what: str) -> _Element:
+        """Return what an element contains, or the member that its source names.
+
+        Args:
+            element: it refers to a document.
+            inside: path in the element of what contains the document in place.
+            tag: of the document's root.
+            what: the content in words, for messages.
+
+        Raises:
+            SspError: it has neither or both, or the member cannot be read.
+        """
+        content, source = element.find(inside + tag), element.get("source")
+        if content is not None and source:
+            raise SspError(f"{what} are given both in place and by the source {source!r}", element)
+        if content is None and not source:
+            raise SspError(f"{what} are named that are nowhere", element)
+        if content is None:
+            return self.xml(self.member(element), tag)
+        check_version(content)
+        return content
+
     def _lacks(self, member: str) -> str:
         """Return what the archive has in place of a missing member."""
         if self._folder:
@@ -303,6 +327,18 @@ def check_version(root: _Element) -> None:
         )
 
 
+def check_type(element: _Element, allowed: str) -> None:
+    """Check that an element refers to a document of the type that is read.
+
+    Raises:
+        SspError: it does not.
+    """
+    if element.get("type", allowed) != allowed:
+        raise SspError(
+            f"{element.get('type')} is not supported: only {allowed} is", element, code="ssp-unsupported"
+        )
+
+
 def unit_definitions(units: Iterable[_Element]) -> dict[str, UnitDefinition]:
     """Return the definitions in `Unit` elements of FMI or SSP, by name."""
     definitions = {}
@@ -391,6 +427,8 @@ class SspStructure:
     """Path -> system, from the innermost to the outermost."""
     connectors: dict[ElementPath, dict[str, SspVariable]] = field(default_factory=dict)
     """Element -> name of a connector -> its kind and unit, if given."""
+    dictionaries: dict[ElementPath, ElementPath] = field(default_factory=dict)
+    """Signal dictionary, or a reference to one -> the path under which its entries are connectors."""
     sources: dict[SspEnd, tuple[SspEnd, _Element]] = field(default_factory=dict)
     """Target -> its source and the connection between them."""
 
@@ -476,6 +514,8 @@ def _add_system(
     definitions: Mapping[str, UnitDefinition],
 ) -> None:
     structure.connectors[path] = _connectors(system, definitions)
+    for dictionary in system.iterfind(f"{{{SSD}}}SignalDictionaries/{{{SSD}}}SignalDictionary"):
+        _add_dictionary(structure, archive, dictionary, path, definitions)
     names: set[str] = set()
     for element in system.iterfind(f"{{{SSD}}}Elements/*"):
         kind, name = etree.QName(element).localname, element.get("name", "")
@@ -489,7 +529,7 @@ def _add_system(
             structure.components[inner] = _component(archive, element, inner)
             structure.connectors[inner] = _connectors(element, definitions)
         elif kind == "SignalDictionaryReference":
-            raise SspError(f"a signal dictionary ({name}) is not supported", element, code="ssp-unsupported")
+            structure.dictionaries[inner] = _dictionary(structure, element, path)
         else:
             raise SspError(
                 f"an element of kind {kind} ({name}) is not supported", element, code="ssp-unsupported"
@@ -502,9 +542,41 @@ def _add_system(
     structure.systems[path] = system
 
 
-def _connectors(element: _Element, definitions: Mapping[str, UnitDefinition]) -> dict[str, SspVariable]:
+def _add_dictionary(
+    structure: SspStructure,
+    archive: SspArchive,
+    element: _Element,
+    path: ElementPath,
+    definitions: Mapping[str, UnitDefinition],
+) -> None:
+    """Add the signal dictionary of a system, whose entries every reference to it shares, as a bus."""
+    check_type(element, DICTIONARY_TYPE)
+    content = archive.content(element, "", f"{{{SSB}}}SignalDictionary", "signals")
+    own = {**definitions, **unit_definitions(content.iterfind(f"{{{SSB}}}Units/*"))}
+    name = element.get("name", "")
+    key, place = (*path, "", name), (*path, f"signal dictionary {name}")
+    structure.dictionaries[key] = place
+    structure.connectors[place] = _connectors(content, own, f"{{{SSB}}}DictionaryEntry")
+
+
+def _dictionary(structure: SspStructure, reference: _Element, path: ElementPath) -> ElementPath:
+    """Return the path of the dictionary that a reference names, in its own system or one around it."""
+    name = reference.get("dictionary", "")
+    for depth in range(len(path), -1, -1):
+        if (place := structure.dictionaries.get((*path[:depth], "", name))) is not None:
+            return place
+    raise SspError(
+        f"there is no signal dictionary {name!r}, to which {reference.get('name')!r} refers", reference
+    )
+
+
+def _connectors(
+    element: _Element,
+    definitions: Mapping[str, UnitDefinition],
+    tag: str = f"{{{SSD}}}Connectors/{{{SSD}}}Connector",
+) -> dict[str, SspVariable]:
     connectors: dict[str, SspVariable] = {}
-    for connector in element.iterfind(f"{{{SSD}}}Connectors/{{{SSD}}}Connector"):
+    for connector in element.iterfind(tag):
         unit = next((kind.get("unit") for kind in connector if kind.get("unit")), None)
         shape = _whole(dimension.get("size") for dimension in connector.iterfind(f"{{{SSC}}}Dimension"))
         declared = SspVariable(connector.get("kind", ""), unit, definitions.get(str(unit)), shape=shape)
@@ -574,12 +646,14 @@ def _elements_at(
 def _end(structure: SspStructure, connection: _Element, which: str, path: ElementPath) -> SspEnd:
     element, name = connection.get(f"{which}Element"), connection.get(f"{which}Connector", "")
     inner = (*path, element) if element else path
+    inner = structure.dictionaries.get(inner, inner)
     if inner not in structure.connectors:
         raise SspError(
             f"a connection names {element!r}: there is no such component", connection, code="file-missing"
         )
     if inner not in structure.components and name not in structure.connectors[inner]:
-        system = f"the system {'.'.join(inner)}" if inner else "the system"
+        of = "the " if inner in structure.dictionaries.values() else "the system "
+        system = of + ".".join(inner) if inner else "the system"
         raise SspError(
             f"a connection names the connector {name!r}: {system} has none of this name", connection
         )

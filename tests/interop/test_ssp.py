@@ -400,7 +400,7 @@ def test_a_start_value_of_a_connected_input_counts_for_nothing(feedback, fmus, t
         (
             "<ssd:Elements>",
             '<ssd:Elements><ssd:SignalDictionaryReference name="bus" dictionary="d"/>',
-            ("signal", "dictionary", "bus"),
+            ("signal", "dictionary", "'d'", "'bus'"),
         ),
         ('startElement="driver"', 'startElement="nobody"', ("'nobody'", "component")),
         ('startElement="driver"', "", ("'steer_angle'", "connector", "system")),
