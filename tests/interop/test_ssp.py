@@ -116,10 +116,11 @@ def every_scenario():
 
 
 @pytest.mark.parametrize("scenario", every_scenario())
-@pytest.mark.sampled(2)
-def test_a_round_trip_gives_the_same_numbers_to_the_last_bit(scenario, fmus, tmp_path):
+@pytest.mark.parametrize("standard", ["1.0", "2.0"])
+@pytest.mark.sampled(3)
+def test_a_round_trip_gives_the_same_numbers_to_the_last_bit(scenario, standard, fmus, tmp_path):
     plan = plan_of(SCENARIOS / scenario, fmus)
-    write_ssp(plan, tmp_path / "system.ssp")
+    write_ssp(plan, tmp_path / "system.ssp", standard)
     back = make_plan(load_scenario(tmp_path / "system.ssp"))
     assert back.n_steps == plan.n_steps
     assert back.algorithm == plan.algorithm

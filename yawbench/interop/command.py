@@ -213,3 +213,53 @@ def export_fmu(scenario: ScenarioFile, options: RunOptions, out: FmuOption = Non
     for note in notes:
         say(f"note: {note}")
     say(f"{path}: {len(plan.instances)} instances, {len(plan.wires)} connections")
+
+
+DbcFile = Annotated[
+    Path, typer.Argument(metavar="DBC", help="DBC file of a CAN network.", show_default=False)
+]
+Channels = Annotated[
+    list[str] | None,
+    typer.Argument(
+        metavar="CHANNEL=MESSAGE.SIGNAL",
+        help="Channel of a sensor and its signal. Default: list all signals.",
+    ),
+]
+BitRate = Annotated[
+    float | None,
+    typer.Option(
+        "--bit-rate", metavar="NUMBER", help="Of the bus in bit/s, for the latency. Default: none.", min=1
+    ),
+]
+Radius = Annotated[
+    float | None,
+    typer.Option("--wheel-radius", metavar="NUMBER", help="In m, of wheel speeds in km/h or m/s.", min=0.01),
+]
+
+
+@tabular
+def dbc(
+    file: DbcFile, channels: Channels = None, bit_rate: BitRate = None, wheel_radius: Radius = None
+) -> None:
+    """Print parameters of a sensor with the numbers of a CAN network.
+
+    Resolution, range, time between messages and latency, as `parameters:` of a sensor in a scenario.
+    """
+    from yawbench.studies.tables import Table
+
+    from .can_signals import read_dbc, sensor_parameters
+
+    signals = read_dbc(file)
+    if not channels:
+        headings = ["signal", "unit", "resolution", "from", "to", "cycle, ms"]
+        table = Table(str(file), headings, numbers={2, 3, 4, 5})
+        for name, one in signals.items():
+            numbers = one.scale if one.whole else 0.0, one.least, one.largest, 1000 * one.cycle
+            table.rows.append([name, one.unit, *(f"{number:g}" for number in numbers)])
+        print_tables([table])
+        return
+    pairs = dict(text.partition("=")[::2] for text in channels)
+    parameters = sensor_parameters(signals, pairs, bit_rate=bit_rate, wheel_radius=wheel_radius)
+    print(printable(f"parameters:   # {file.name}: {', '.join(channels)}"))
+    for name, value in parameters.items():
+        print(f"  {name}: {value!r}")
