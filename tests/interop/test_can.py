@@ -9,11 +9,15 @@ import numpy as np
 import pytest
 
 from tests.changed import changed
+from tests.conftest import put_fmus
+from tests.fmus.fake_fmus import Var, make_fmu
 from tests.refusals import mentions
 from yawbench.cli import main
-from yawbench.foundation.errors import ScenarioError
+from yawbench.foundation.errors import ScenarioError, YawbenchError
+from yawbench.interop.can_log import write_log
 from yawbench.interop.can_signals import read_dbc, sensor_parameters
 from yawbench.orchestrator.master.simulate import simulate
+from yawbench.orchestrator.recordings.recording_formats import ColumnFile
 from yawbench.orchestrator.results.reader import load_results
 from yawbench.orchestrator.scenario.loader import load_scenario
 from yawbench.orchestrator.wiring.make_plan import make_plan
@@ -59,14 +63,25 @@ def dbc(tmp_path) -> Path:
     return path
 
 
-def test_every_message_of_a_run_is_what_the_network_carries(dbc, fmus, tmp_path):
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    """The results of a run with a sensor that has the numbers of the network."""
+    tmp_path = tmp_path_factory.mktemp("can")
+    fmus, dbc = tmp_path / "fmus", tmp_path / "car.dbc"
+    fmus.mkdir()
+    put_fmus(fmus, components=UNITS)
+    dbc.write_text(DBC, encoding="cp1252")
     given = sensor_parameters(read_dbc(dbc), CHANNELS, wheel_radius=RADIUS)
     settings = [f"sensor.{name}={value!r}" for name, value in given.items()]
     scenario = load_scenario(
         SCENARIO, changes=changed(swaps=["sensor=sensor_ideal"], settings=settings, stop_time=3)
     )
     simulate(make_plan(scenario, fmus=fmus), tmp_path / "out")
-    results = load_results(tmp_path / "out")
+    return load_results(tmp_path / "out")
+
+
+def test_every_message_of_a_run_is_what_the_network_carries(dbc, run):
+    results = run
     database = cantools.database.load_file(dbc)
     names = {"wheel_speed": ("plant.wheel_speed_fl", "sensor.wheel_speed_fl")}
     saturated = 0
@@ -89,6 +104,77 @@ def test_every_message_of_a_run_is_what_the_network_carries(dbc, fmus, tmp_path)
         held = results[measured][:whole].reshape(-1, every)
         assert (held == held[:, :1]).all()
     assert saturated > 10
+
+
+@pytest.mark.parametrize("ending", ["blf", "asc"])
+def test_a_log_of_a_run_is_a_recording_of_its_messages(dbc, run, tmp_path, capsys, ending):
+    pytest.importorskip("can")
+    log = tmp_path / f"run.{ending}"
+    pairs = [
+        "sensor.yaw_rate=Inertial.YawRate",
+        "sensor.acceleration_y=Inertial.LateralAcceleration",
+        "sensor.wheel_speed_fl=Wheels.FrontLeft",
+    ]
+    options = ["--dbc", str(dbc), "--out", str(log), "--wheel-radius", str(RADIUS)]
+    with pytest.raises(SystemExit) as ended:
+        main(["export-can", str(run.folder), *pairs, *options])
+    assert not ended.value.code, capsys.readouterr().err
+    file = ColumnFile(log)
+    for pair, cycle, unit in zip(pairs, (4, 4, 8), ("deg/s", "g", "km/h"), strict=True):
+        column, _, signal = pair.partition("=")
+        got = file.column(signal.partition(".")[2], "time")
+        assert (got.unit, got.time_unit) == (unit, "s")
+        assert got.times == pytest.approx(run.time[::cycle], abs=2e-6)
+        assert got.values * SI[unit] == pytest.approx(run[column][::cycle], abs=1e-9)
+    with pytest.raises(ValueError, match="no column") as caught:
+        file.column("YawRat", "time")
+    assert mentions(str(caught.value), "'YawRate'")
+
+
+def test_a_log_is_a_time_series_of_an_input(dbc, run, tmp_path):
+    pytest.importorskip("can")
+    count = write_log(run, dbc, {"sensor.yaw_rate": "Inertial.YawRate"}, tmp_path / "run.blf")
+    assert count == 301
+    make_fmu(tmp_path / "a.fmu", inputs=[Var("rate", "rad/s")], outputs=["y"])
+    (tmp_path / "s.yaml").write_text(
+        "stop_time: 3\nstep_size: 0.01\nunits: {a: {fmu: ./a.fmu}}\n"
+        "inputs: {a.rate: {file: run.blf, column: YawRate, interpolation: held}}\n"
+    )
+    (unit,) = make_plan(load_scenario(tmp_path / "s.yaml")).instances
+    assert unit.series["rate"].values == pytest.approx(run["sensor.yaw_rate"][::4], abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("content", "others", "names"),
+    [
+        (None, (), ("DBC", "run.dbc", "none")),
+        (None, ("a.dbc", "b.dbc"), ("DBC", "a.dbc", "b.dbc")),
+        (b"not a log", ("car.dbc",), ("damaged",)),
+    ],
+)
+def test_a_log_that_cannot_be_decoded_is_refused(tmp_path, content, others, names):
+    pytest.importorskip("can")
+    for name in others:
+        (tmp_path / name).write_text(DBC, encoding="cp1252")
+    (tmp_path / "run.blf").write_bytes(content or b"")
+    with pytest.raises(ValueError, match=r".") as caught:
+        ColumnFile(tmp_path / "run.blf")
+    assert mentions(str(caught.value), *names)
+
+
+def test_what_cannot_be_written_into_a_log_is_refused(dbc, run, tmp_path):
+    pytest.importorskip("can")
+    for columns, path, names in (
+        ({"sensor.yaw_rate": "Inertial.Yaw"}, "a.blf", ("'Inertial.Yaw'", "'Inertial.YawRate'")),
+        ({"sensor.yaw_rate": "Wheels.FrontLeft"}, "a.blf", ("'km/h'", "rad/s")),
+        ({"sensor.brake_pressure_fl": "Pressures.FrontLeft"}, "a.blf", ("Pressures", "cycle")),
+        ({"sensor.yaw_rat": "Inertial.YawRate"}, "a.blf", ("yaw_rat",)),
+        ({"sensor.yaw_rate": "Inertial.YawRate"}, "a.txt", (".blf", ".asc")),
+    ):
+        with pytest.raises(YawbenchError) as caught:
+            write_log(run, dbc, columns, tmp_path / path)
+        assert mentions(str(caught.value), *names)
+        assert not (tmp_path / path).exists()
 
 
 def test_resolution_range_cycle_and_frame_of_a_signal(dbc):

@@ -22,7 +22,8 @@ from typing import Any, NamedTuple
 from yawbench.components.sensing.cluster_parameters import CHANNELS
 from yawbench.foundation.errors import ScenarioError
 from yawbench.foundation.messages import hint
-from yawbench.foundation.safe_files import TEXT, read_bytes, reason
+from yawbench.foundation.safe_files import reason
+from yawbench.orchestrator.recordings.can_logs import load_database
 from yawbench.orchestrator.recordings.units_of_loggers import factors, stated_unit
 from yawbench.orchestrator.scenario.quantities import parse_unit
 
@@ -57,25 +58,24 @@ def read_dbc(path: Path) -> dict[str, CanSignal]:
     Raises:
         ScenarioError: cantools is missing, or the file cannot be read.
     """
+    return signals_of(open_dbc(path))
+
+
+def open_dbc(path: Path) -> Any:
+    """Return a DBC file as cantools has it; errors as for `read_dbc`."""
     try:
-        import cantools
+        return load_database(path)
     except ImportError:
         sentence = f"{path}: cantools is not installed: pip install 'yawbench[can]'"
         raise ScenarioError(sentence, code="package-missing") from None
-    try:
-        text = read_bytes(path, largest=TEXT).decode(
-            "cp1252"
-        )  # as the program that made the format writes it
-        database: Any = cantools.database.load_string(text, database_format="dbc")
     except FileNotFoundError:
         raise ScenarioError(f"{path}: no such file", code="file-missing") from None
     except (OSError, ValueError) as error:
-        raise ScenarioError(
-            f"{path}: cannot read this file: {reason(error)}", code="file-unreadable"
-        ) from None
-    except Exception as error:  # cantools raises whatever its parsing meets
-        sentence = f"{path}: not understood as DBC: {' '.join(str(error).split())}"
-        raise ScenarioError(sentence, code="file-unreadable") from None
+        raise ScenarioError(f"{path}: {reason(error)}", code="file-unreadable") from None
+
+
+def signals_of(database: Any) -> dict[str, CanSignal]:
+    """Return the signals of an open DBC file by their names."""
     signals = (_signal(message, signal) for message in database.messages for signal in message.signals)
     return {str(signal): signal for signal in signals}
 

@@ -263,3 +263,30 @@ def dbc(
     print(printable(f"parameters:   # {file.name}: {', '.join(channels)}"))
     for name, value in parameters.items():
         print(f"  {name}: {value!r}")
+
+
+ResultsFolder = Annotated[
+    Path, typer.Argument(metavar="RESULTS", help="Folder with results.", show_default=False)
+]
+Columns = Annotated[
+    list[str],
+    typer.Argument(metavar="COLUMN=MESSAGE.SIGNAL", help="Recorded signal and the signal that carries it."),
+]
+DbcOption = Annotated[Path, typer.Option("--dbc", metavar="FILE", help="DBC file of the network.")]
+LogOption = Annotated[Path, typer.Option("--out", metavar="FILE", help="Log to write, .blf or .asc.")]
+
+
+def export_can(
+    results: ResultsFolder, columns: Columns, dbc: DbcOption, out: LogOption, wheel_radius: Radius = None
+) -> None:
+    """Write results as a log of CAN frames.
+
+    Measurement files and time series read the log like any other recording, with the DBC file beside it.
+    """
+    from yawbench.orchestrator.results.reader import load_results
+
+    from .can_log import write_log
+
+    pairs = dict(text.partition("=")[::2] for text in columns)
+    count = write_log(load_results(results), dbc, pairs, out, wheel_radius=wheel_radius)
+    say(f"{out}: {counted(count, 'frame')}")
