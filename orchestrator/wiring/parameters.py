@@ -6,8 +6,10 @@ instance that takes them.
 
 from __future__ import annotations
 
+import json
 import sys
 from collections.abc import Callable, Collection, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, ClassVar
@@ -19,7 +21,7 @@ from yawbench.foundation.safe_files import TEXT, read_bytes
 
 from ..plan import LITERATURE, PARAMETERS, Given, Instance, ValueOrigin, ValueSource
 from ..scenario import quantities
-from ..scenario.schema import TextSpec
+from ..scenario.schema import TextSpec, array_value
 from .context import WiringContext, facts_of
 
 LARGEST, LARGEST_SINGLE = sys.float_info.max, (2 - 2**-23) * 2.0**127
@@ -94,16 +96,21 @@ def _other(variable: Variable, raw: Value) -> Value:
 def values_of_array(elements: Sequence[Variable], given: Given[Any]) -> dict[str, Given[Any]]:
     """Return the values of the elements of an array by name, from a list, or one with a list for every row.
 
+    An option gives the list as text, `[[1, 2], [3, 4]]`.
+
     Raises:
         ValueError: it is no list, or has not as many values as the array has elements.
     """
     sizes = elements[-1].name.rpartition("[")[2][:-1].split(",")
-    if _shape(given.value) not in (tuple(map(int, sizes)), (len(elements),)):
+    values = given.value
+    if isinstance(values, str) and values.startswith("["):
+        with suppress(ValueError):
+            values = array_value(json.loads(values))
+    if _shape(values) not in (tuple(map(int, sizes)), (len(elements),)):
         raise ValueError(
             f"{elements[0].array} is an array of {'x'.join(sizes)} elements and takes a list of "
             f"{len(elements)} values, row by row (got {short(given.value)})"
         )
-    values = given.value
     while isinstance(values[0], list):
         values = [one for row in values for one in row]
     return {v.name: replace(given, value=one) for v, one in zip(elements, values, strict=True)}

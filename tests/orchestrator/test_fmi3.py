@@ -246,6 +246,16 @@ def test_whole_arrays_are_given_and_connected(run, isolate):
     assert [results[f"n.y[{i}]"][-1] for i in (1, 2)] == [230, 5 * 230 + 2 * 530]
 
 
+def test_options_give_whole_arrays(run):
+    options = ("--set", "m.A=[[1, 2], [3, 4]]", "--set", "inputs.m.u=[7, 8]")
+    status, said, results = run({"m": ("Matrix", {})}, *options, inputs={"m.u": [0, 0]})
+    assert status == 0, said
+    assert [results[f"m.y[{i}]"][-1] for i in (1, 2)] == [7 + 16, 21 + 32]
+    status, said, _ = run({"m": ("Matrix", {})}, "--set", "m.A=[1, nan, 3, 4]", inputs={"m.u": [0, 0]})
+    assert status == 2
+    assert mentions(said, "--set m.A", "2x2", "4")
+
+
 def test_an_element_takes_precedence_over_its_array(run):
     status, said, results = run({"m": ("Matrix", {})}, inputs={"m.u[2]": 3.0, "m.u": [7, 8]})
     assert status == 0, said
