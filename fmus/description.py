@@ -12,13 +12,13 @@ import platform as machine
 import sys
 import zipfile
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
 from yawbench.foundation.errors import Diagnostic, ModelDescriptionError
-from yawbench.foundation.messages import short
+from yawbench.foundation.messages import listed, short
 
 from .fmu import Fmu, UnitDefinition, Value, Variable, element_names
 from .zip_members import misplaced
@@ -277,6 +277,43 @@ def describe(files: Mapping[str, bytes], raw: bytes, path: Path) -> Fmu:
         needs_tool=kind.needsExecutionTool,
         host_packages=tuple(_annotated(root, "hostPackages", "names").split()),
     )
+
+
+def resized(fmu: Fmu, values: Mapping[str, Value]) -> Fmu:
+    """Return an FMU whose structural parameters have other values, which are the sizes of arrays.
+
+    An array whose start values are for another size has none.
+
+    Raises:
+        ModelDescriptionError: an array becomes too large.
+    """
+    from fmpy.model_description import read_model_description
+
+    root = ElementTree.fromstring((fmu.directory / MODEL_DESCRIPTION).read_bytes())
+    sized = {}
+    for element in root.iterfind("ModelVariables/*"):
+        if element.get("name") in values:
+            value = values[str(element.get("name"))]
+            element.set("start", str(value).lower())
+            sized[element.get("valueReference")] = value
+    for element in root.iterfind("ModelVariables/*"):
+        dimensions = [d.get("valueReference") for d in element.iterfind("Dimension")]
+        if any(reference in sized for reference in dimensions):
+            if len((element.get("start") or "").split()) > 1:
+                del element.attrib["start"]
+            starts = element.findall("Start")
+            for start in starts if len(starts) > 1 else ():
+                element.remove(start)
+    content = {MODEL_DESCRIPTION: ElementTree.tostring(root, "utf-8", xml_declaration=True)}
+    variables, refused = scalars(read_model_description(_for_fmpy(content), validate=False), root)
+    for name, why in refused.items():
+        if name not in fmu.refused:
+            raise ModelDescriptionError(f"{fmu.path}: with {_spelled(values)}, {name} {why}")
+    return replace(fmu, variables=variables, refused=refused)
+
+
+def _spelled(values: Mapping[str, Value]) -> str:
+    return listed(f"{name} = {value}" for name, value in values.items())
 
 
 def _for_fmpy(files: Mapping[str, bytes]) -> io.BytesIO:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass, field
+from collections.abc import Collection
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Literal, NamedTuple
@@ -80,6 +81,11 @@ class Variable:
         """Its reference in the FMU. The functions of FMI 2.0 treat an enumeration as an Integer."""
         kind = self.encoding or ("Integer" if self.items is not None else self.type)
         return ValueRef(kind, self.reference, self.element, self.elements)
+
+    @property
+    def array(self) -> str:
+        """Name of the array of which it is an element; of a scalar, its own."""
+        return self.name.rpartition("[")[0] if self.elements > 1 else self.name
 
     @property
     def fmi_type(self) -> str:
@@ -190,6 +196,20 @@ class Fmu(SentOnce):
             if variable.alias_of is None:
                 variables.setdefault(variable.causality, []).append(variable)
         return variables
+
+    def elements_of(self, name: str, causality: str) -> list[Variable]:
+        """Return the elements of an array of a causality, row by row; none if there is no such array."""
+        if name in self.variables:
+            return []
+        found = (v for v in self.variables.values() if v.array == name and v.causality == causality)
+        return [self.variables[v.alias_of or v.name] for v in found]
+
+    def driven(self, names: Collection[str]) -> Fmu:
+        """Return the FMU with these parameters as inputs, since they change during a run."""
+        variables = {
+            name: replace(v, causality="input") if name in names else v for name, v in self.variables.items()
+        }
+        return replace(self, variables=variables)
 
     def aliases(self) -> dict[str, str]:
         """Return other name -> name of the inputs that have several."""

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final, Generic, Literal, TypeVar
 if TYPE_CHECKING:
     import numpy as np
 
-from yawbench.fmus.fmu import Fmu, Value
+from yawbench.fmus.fmu import Causality, Fmu, Value
 from yawbench.foundation.errors import Diagnostic, Location
 from yawbench.foundation.messages import cut
 from yawbench.vocabulary.roles import role_of
@@ -30,6 +30,8 @@ OF_FILES: tuple[OriginKind, ...] = "default", "vehicle", "derived", "scenario", 
 """Kinds of origins that are not overrides."""
 SourceKind = Literal["paper", "literature", "chosen", "erratum", "varied", "neutral"]
 """Kind of a source: "varied" is an override, "neutral" has no source of its own."""
+PARAMETERS: tuple[Causality, ...] = "parameter", "structuralParameter"
+"""Causalities of what a scenario lists under `parameters`."""
 SENSING = {"sensor": "measurement", "estimator": "estimate"}
 """Role of an instance -> kind of values that its outputs are, as opposed to the truth."""
 

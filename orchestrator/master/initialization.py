@@ -1,6 +1,7 @@
 """Initialization: bring all instances to a consistent start.
 
-Parameters are set after the experiment is set up, because some tools' FMUs reset the model there, and are
+Structural parameters come first, in configuration mode. Other parameters are set after the experiment is set
+up, because some tools' FMUs reset the model there, and are
 read back in initialization mode: a parameter that did not take its value is an error. Instances enter
 initialization mode in evaluation order, each with the outputs of those before it. Then values are exchanged
 in passes until no input changes by a single bit, which settles closed loops (tyre forces, accelerations). A
@@ -76,8 +77,15 @@ def initialize(
     for slot in entered():
         tolerance = slot.instance.tolerance or slot.instance.fmu.tolerance
         experiment = ExperimentSetup(start, stop, tolerance)
+        sizes, parameters = _split(slot)
+        if sizes:
+            groups = [
+                ([v.ref for v in chosen], [v.encoded(sizes[v.name]) for v in chosen])
+                for chosen in by_type(slot.instance.fmu.variables[name] for name in sizes)
+            ]
+            check(slot.name, "setting structural parameters", slot.fmu_instance.configure(groups))
         check(slot.name, "initialization", slot.fmu_instance.setup(experiment))
-        _put(slot, slot.instance.parameters, "setting parameters", check)
+        _put(slot, parameters, "setting parameters", check)
         _put(slot, _known_inputs(signals, slot), "setting inputs", check)
         check(slot.name, "initialization", slot.fmu_instance.enter())
         _check_parameters(slot, check, log)
@@ -98,6 +106,13 @@ def initialize(
                 signals.other(wire)  # raises if the input cannot be this number
     signals.start_history()
     return number
+
+
+def _split(slot: InstanceSlot) -> tuple[dict[str, Value], dict[str, Value]]:
+    """Return the values of an instance's structural parameters, and those of its other parameters."""
+    of, values = slot.instance.fmu.variables, slot.instance.parameters
+    sizes = {name: v for name, v in values.items() if of[name].causality == "structuralParameter"}
+    return sizes, {name: v for name, v in values.items() if name not in sizes}
 
 
 def _put(slot: InstanceSlot, requested: Mapping[str, Value], what: str, check: StatusCheck) -> None:

@@ -93,6 +93,9 @@ class FmuInstance(Protocol):
     def fetch(self, refs: Sequence[ValueRef]) -> tuple[Status, list[Value]]:
         """Return the status and the values of variables of one type."""
 
+    def configure(self, groups: Sequence[tuple[Sequence[ValueRef], Sequence[Value]]]) -> Status:
+        """Set structural parameters, in groups of one type, before anything that has their sizes."""
+
     def setup(self, experiment: ExperimentSetup) -> Status:
         """Set up the experiment: start time, stop time, tolerance."""
 
@@ -324,6 +327,15 @@ class CtypesInstance(FmuInstance, ABC):
         elif kind == "Boolean":
             values = [bool(value) for value in values]
         return status, values
+
+    def configure(self, groups: Sequence[tuple[Sequence[ValueRef], Sequence[Value]]]) -> Status:
+        for name in ("EnterConfigurationMode", "ExitConfigurationMode"):
+            if not self._has(name):
+                return self._impossible(f"the library lacks {self.prefix}{name}")
+        status = self._do("EnterConfigurationMode")
+        for refs, values in groups:
+            status = max(status, self.put(refs, values)) if status <= WARNING else status
+        return max(status, self._do("ExitConfigurationMode")) if status <= WARNING else status
 
     def exit(self) -> Status:
         return self._do("ExitInitializationMode")

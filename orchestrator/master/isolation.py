@@ -162,6 +162,10 @@ class IsolatedInstance(Worker):
         failed: tuple[Status, list[Value]] = (FATAL, [0] * len(refs))
         return self._ask(f"{self._prefix}Get{refs[0].type}", failed, "fetch", list(refs))
 
+    def configure(self, groups: Sequence[tuple[Sequence[ValueRef], Sequence[Value]]]) -> Status:
+        function = f"{self._prefix}EnterConfigurationMode or {self._prefix}ExitConfigurationMode"
+        return self._ask(function, FATAL, "configure", list(groups))
+
     def setup(self, experiment: ExperimentSetup) -> Status:
         return self._ask(f"{self._prefix}SetupExperiment", FATAL, "setup", experiment)
 

@@ -160,7 +160,7 @@ class Master:
         """Initialize all instances and record the start as `advance` does.
 
         Raises:
-            SimulationError: an instance fails or logs an error, a wire does not settle or is not finite.
+            SimulationError: an instance fails, a wire does not settle or is not finite.
         """
         self.passes = initialize(self.signals, self._entered, self._check_initialization, self.log)
         self._check_finite(0)
@@ -295,12 +295,12 @@ class Master:
         self._position.leave()
 
     def _check_initialization(self, instance: str, what: str, status: Status) -> None:
-        """Check a call made during initialization, where a logged error counts whatever the status is."""
+        """Check a call made during initialization."""
         end_copy_of(self._process)
         self._position.returned = time.monotonic()
         self._arithmetic.restore(instance, self.log)
         status = self.signals.of[instance].fmu_instance.note(status)
-        if status > WARNING or self.log.errors(instance):
+        if status > WARNING:
             start = self.plan.time(0)
             raise self._failure(describe(instance, what, start, status, self.log), instance, start)
         if status == WARNING:

@@ -1,4 +1,4 @@
-"""Files of recorded columns: CSV and other text, .vbo of Racelogic, Parquet and ASAM MDF.
+"""Files of recorded columns: CSV and other text, .vbo of Racelogic, Parquet, ASAM MDF and logs of CAN frames.
 
 A header may name a unit, `delta [deg]`, and text may have a row of units below its header; Parquet has
 units in the metadata of fields, MDF in channels. The units of results of this program are in the run.json
@@ -25,6 +25,7 @@ from yawbench.foundation.safe_files import read_bytes, reading, reason
 
 from ..results.run_record import RUN_FILE, check_record
 from ..scenario.quantities import Unit, spellings
+from .can_logs import LOGS, database_beside, read_log
 from .text_tables import MISSING, Mark, read_text_table, split_header
 from .units_of_loggers import factors, stated_unit
 
@@ -83,10 +84,13 @@ class ColumnFile:
             self._table = _text(raw, asked, header, decimal)
         elif ending == ".parquet":
             self._table = _parquet(raw)
+        elif ending in LOGS:
+            self._table = _can_log(path, raw)
+            self.sha256 = hashlib.sha256(raw + read_bytes(database_beside(path), largest=LARGEST)).hexdigest()
         elif ending in MDF:
             self._table = _mdf(raw, {name.partition("#")[0].strip() for name in asked})
         else:
-            raise ValueError(f"must be a file of type {', '.join((*TEXT, '.parquet', *MDF))}")
+            raise ValueError(f"must be a file of type {', '.join((*TEXT, '.parquet', *MDF, *LOGS))}")
         self.notes = self._table.notes
         self._clocks: dict[int, np.ndarray] = {}
         self._names: list[str] = []
@@ -242,6 +246,18 @@ def _mdf(raw: bytes, asked: Collection[str]) -> _Table:
 
     headers, units = [name for _, _, name, _ in channels], [stated_unit(unit) for *_, unit in channels]
     return _Table(headers, units, sources, values, times=lambda at: signal(at).timestamps)
+
+
+def _can_log(path: Path, raw: bytes) -> _Table:
+    """Return the signals of a log of CAN frames, each with the times of its messages."""
+    signals = read_log(path, raw)
+    return _Table(
+        [signal.name for signal in signals],
+        [stated_unit(signal.unit) for signal in signals],
+        [signal.message for signal in signals],
+        lambda at: signals[at].values,
+        times=lambda at: signals[at].times,
+    )
 
 
 def _group_name(group: Any) -> str:

@@ -94,6 +94,18 @@ def plain_value(value: object) -> Value:
     raise ValueError("has no value" if value is None else f"must be one value (got {short(value)})")
 
 
+def array_value(value: object) -> list[Any]:
+    """Return the values of an array: a list, row by row, or a list for every row.
+
+    Raises:
+        ValueError: one of them is not a value.
+    """
+    assert isinstance(value, list)
+    if not value:
+        raise ValueError("has no values")
+    return [array_value(item) if isinstance(item, list) else plain_value(item) for item in value]
+
+
 def _end(value: object) -> SignalName | list[str]:
     if not isinstance(value, list):
         return endpoint(value)
@@ -193,11 +205,17 @@ class TextSpec(StrictModel):
 
 
 def _form(value: object) -> str:
-    return "of file" if isinstance(value, dict) else "value"
+    return "of file" if isinstance(value, dict) else "array" if isinstance(value, list) else "value"
 
 
+Array = Annotated[
+    list[Any],
+    PlainValidator(array_value),
+    WithJsonSchema({"type": "array", "minItems": 1, "description": "Values of an array, row by row"}),
+]
 ParameterValue = Annotated[
-    Annotated[Scalar, Tag("value")] | Annotated[TextSpec, Tag("of file")], Discriminator(_form)
+    Annotated[Scalar, Tag("value")] | Annotated[Array, Tag("array")] | Annotated[TextSpec, Tag("of file")],
+    Discriminator(_form),
 ]
 GivenParameter = Annotated[Given[ParameterValue], _AsGiven()]
 
@@ -244,7 +262,8 @@ class SeriesSpec(StrictModel):
 
 
 InputValue = Annotated[
-    Annotated[Scalar, Tag("value")] | Annotated[SeriesSpec, Tag("of file")], Discriminator(_form)
+    Annotated[Scalar, Tag("value")] | Annotated[Array, Tag("array")] | Annotated[SeriesSpec, Tag("of file")],
+    Discriminator(_form),
 ]
 GivenInput = Annotated[Given[InputValue], _AsGiven()]
 

@@ -1,6 +1,7 @@
 """SSP archives: their members, and components and connections, with nested systems flattened.
 
-Nothing is unpacked to disk, and references outside of the archive are refused. An archive may have several
+Nothing is unpacked to disk, and references outside of the archive, or of the folder of a description on its
+own, are refused. An archive may have several
 descriptions, variants of a system: `SystemStructure.ssd` is the default, another is named as if the archive
 were a folder, `system.ssp/other.ssd`.
 
@@ -44,6 +45,7 @@ PARAMETER_SET = "scenario"
 SSD = "http://ssp-standard.org/SSP1/SystemStructureDescription"
 SSC = "http://ssp-standard.org/SSP1/SystemStructureCommon"
 SSV = "http://ssp-standard.org/SSP1/SystemStructureParameterValues"
+SSB = "http://ssp-standard.org/SSP1/SystemStructureSignalDictionary"
 SSM = "http://ssp-standard.org/SSP1/SystemStructureParameterMapping"
 OSP = "http://opensimulationplatform.com/SSP/OSPAnnotations"
 OMS = "https://raw.githubusercontent.com/OpenModelica/OMSimulator/master/schema/oms.xsd"
@@ -55,6 +57,7 @@ and libcosim mistakes a declaration further down for content."""
 FMU_TYPE = "application/x-fmu-sharedlibrary"
 VALUES_TYPE = "application/x-ssp-parameter-set"
 MAPPING_TYPE = "application/x-ssp-parameter-mapping"
+DICTIONARY_TYPE = "application/x-ssp-signal-dictionary"
 
 OSP_ANNOTATION = "com.opensimulationplatform"
 OMS_ANNOTATION = "org.openmodelica"
@@ -105,7 +108,8 @@ class SspArchive:
     """An SSP archive, read into memory.
 
     Args:
-        path: of the archive, or of a description in it, `system.ssp/other.ssd`.
+        path: of the archive, or of a description in it, `system.ssp/other.ssd`. A description in a folder is
+            read with the files of that folder.
         what: kind of the file, for messages.
 
     Raises:
@@ -119,13 +123,12 @@ class SspArchive:
         """Name of the member that describes the system."""
         self.root = "." if inside else self.path.name
         """Path of the archive, from the folder of `path`."""
-        if inside and self.path.is_dir():
+        self._variables: dict[str, dict[str, SspVariable]] = {}
+        self._folder = inside and self.path.is_dir()
+        if self._folder:
             if not path.exists():
                 raise SspError("no such file", code="file-missing")
-            raise SspError(
-                "an .ssd file is read inside its archive: pack its folder as an .ssp file and give that",
-                code="file-wrong-kind",
-            )
+            return
         try:
             raw = read_bytes(self.path, largest=PACKED)
         except FileNotFoundError:
@@ -139,12 +142,27 @@ class SspArchive:
             raise SspError(f"cannot read this {what}: {error}", code="file-unreadable") from None
         except _DAMAGE as error:
             raise SspError(f"no {what}, or damaged: {error}") from None
-        self._variables: dict[str, dict[str, SspVariable]] = {}
+
+    def _has(self, member: str) -> bool:
+        return (self.path / member).is_file() if self._folder else member in self._members
+
+    def _read(self, member: str, largest: int) -> bytes:
+        """Return the content of a member.
+
+        Raises:
+            ValueError: it is too large.
+        """
+        if self._folder:
+            return read_bytes(self.path / member, largest=largest)
+        if self._members[member].file_size > largest:
+            raise ValueError(f"it is larger than {largest // 10**6} MB")
+        return self._archive.read(self._members[member])
 
     def variants(self) -> dict[str, str]:
         """Return the descriptions in the archive, with their names: member -> name."""
         names = {}
-        for member in self._members:
+        members = [file.name for file in sorted(self.path.iterdir())] if self._folder else self._members
+        for member in members:
             if "/" not in member and member.lower().endswith(".ssd"):
                 try:
                     names[member] = self.xml(member, f"{{{SSD}}}SystemStructureDescription").get("name", "")
@@ -180,24 +198,46 @@ class SspArchive:
         Raises:
             SspError: the member is missing or damaged, or its root is not a `tag`.
         """
-        if member not in self._members:
+        if not self._has(member):
             raise SspError(f"no SSP archive, or not all of it: {self._lacks(member)}")
         try:
-            if self._members[member].file_size > LARGEST:
-                raise SspError(f"{member} is larger than {LARGEST // 10**6} MB")
-            root = etree.fromstring(self._archive.read(self._members[member]), _parser(), base_url=member)
+            root = etree.fromstring(self._read(member, LARGEST), _parser(), base_url=member)
         except etree.XMLSyntaxError as error:
             raise SspError(f"{member} is not well-formed: {error.msg}") from None
-        except _DAMAGE as error:
-            raise SspError(f"{member} is damaged: {error}") from None
+        except (OSError, *_DAMAGE) as error:
+            raise SspError(f"{member} cannot be read: {error}") from None
         if root.tag != tag:
             raise SspError(f"{member} is not a {etree.QName(tag).localname} of SSP 1.0 or 2.0")
         check_version(root)
         return root
 
+    def content(self, element: _Element, inside: str, tag: str, what: str) -> _Element:
+        """Return what an element contains, or the member that its source names.
+
+        Args:
+            element: it refers to a document.
+            inside: path in the element of what contains the document in place.
+            tag: of the document's root.
+            what: the content in words, for messages.
+
+        Raises:
+            SspError: it has neither or both, or the member cannot be read.
+        """
+        content, source = element.find(inside + tag), element.get("source")
+        if content is not None and source:
+            raise SspError(f"{what} are given both in place and by the source {source!r}", element)
+        if content is None and not source:
+            raise SspError(f"{what} are named that are nowhere", element)
+        if content is None:
+            return self.xml(self.member(element), tag)
+        check_version(content)
+        return content
+
     def _lacks(self, member: str) -> str:
         """Return what the archive has in place of a missing member."""
-        others = [] if member in self._members else [n for n in self.variants() if n != member]
+        if self._folder:
+            return f"there is no {member} beside {self.description}"
+        others = [n for n in self.variants() if n != member]
         if member == self.description and others:
             return f"there is no {member}; it has {listed(others)}, run as {self.path}/{others[0]}"
         if member == self.description:
@@ -211,13 +251,13 @@ class SspArchive:
             SspError: the FMU is not in the archive.
         """
         if member not in self._variables:
-            if member not in self._members:
+            if not self._has(member):
                 raise SspError(f"there is no {member} in the archive", component)
             try:
-                with zipfile.ZipFile(io.BytesIO(self._archive.read(self._members[member]))) as fmu:
+                with zipfile.ZipFile(io.BytesIO(self._read(member, PACKED))) as fmu:
                     content = fmu.read(members(fmu)["modelDescription.xml"])
                     description = etree.fromstring(content, _parser())
-            except (KeyError, *_DAMAGE, etree.XMLSyntaxError):
+            except (KeyError, OSError, *_DAMAGE, etree.XMLSyntaxError):
                 description = etree.Element("none")
             self._variables[member] = dict(_declared(description))
         return self._variables[member]
@@ -284,6 +324,18 @@ def check_version(root: _Element) -> None:
             f"a {etree.QName(root).localname} of SSP {short(version)}: supported are 1.0 and 2.0",
             root,
             code="ssp-unsupported",
+        )
+
+
+def check_type(element: _Element, allowed: str) -> None:
+    """Check that an element refers to a document of the type that is read.
+
+    Raises:
+        SspError: it does not.
+    """
+    if element.get("type", allowed) != allowed:
+        raise SspError(
+            f"{element.get('type')} is not supported: only {allowed} is", element, code="ssp-unsupported"
         )
 
 
@@ -375,6 +427,8 @@ class SspStructure:
     """Path -> system, from the innermost to the outermost."""
     connectors: dict[ElementPath, dict[str, SspVariable]] = field(default_factory=dict)
     """Element -> name of a connector -> its kind and unit, if given."""
+    dictionaries: dict[ElementPath, ElementPath] = field(default_factory=dict)
+    """Signal dictionary, or a reference to one -> the path under which its entries are connectors."""
     sources: dict[SspEnd, tuple[SspEnd, _Element]] = field(default_factory=dict)
     """Target -> its source and the connection between them."""
 
@@ -460,6 +514,8 @@ def _add_system(
     definitions: Mapping[str, UnitDefinition],
 ) -> None:
     structure.connectors[path] = _connectors(system, definitions)
+    for dictionary in system.iterfind(f"{{{SSD}}}SignalDictionaries/{{{SSD}}}SignalDictionary"):
+        _add_dictionary(structure, archive, dictionary, path, definitions)
     names: set[str] = set()
     for element in system.iterfind(f"{{{SSD}}}Elements/*"):
         kind, name = etree.QName(element).localname, element.get("name", "")
@@ -473,7 +529,7 @@ def _add_system(
             structure.components[inner] = _component(archive, element, inner)
             structure.connectors[inner] = _connectors(element, definitions)
         elif kind == "SignalDictionaryReference":
-            raise SspError(f"a signal dictionary ({name}) is not supported", element, code="ssp-unsupported")
+            structure.dictionaries[inner] = _dictionary(structure, element, path)
         else:
             raise SspError(
                 f"an element of kind {kind} ({name}) is not supported", element, code="ssp-unsupported"
@@ -486,9 +542,41 @@ def _add_system(
     structure.systems[path] = system
 
 
-def _connectors(element: _Element, definitions: Mapping[str, UnitDefinition]) -> dict[str, SspVariable]:
+def _add_dictionary(
+    structure: SspStructure,
+    archive: SspArchive,
+    element: _Element,
+    path: ElementPath,
+    definitions: Mapping[str, UnitDefinition],
+) -> None:
+    """Add the signal dictionary of a system, whose entries every reference to it shares, as a bus."""
+    check_type(element, DICTIONARY_TYPE)
+    content = archive.content(element, "", f"{{{SSB}}}SignalDictionary", "signals")
+    own = {**definitions, **unit_definitions(content.iterfind(f"{{{SSB}}}Units/*"))}
+    name = element.get("name", "")
+    key, place = (*path, "", name), (*path, f"signal dictionary {name}")
+    structure.dictionaries[key] = place
+    structure.connectors[place] = _connectors(content, own, f"{{{SSB}}}DictionaryEntry")
+
+
+def _dictionary(structure: SspStructure, reference: _Element, path: ElementPath) -> ElementPath:
+    """Return the path of the dictionary that a reference names, in its own system or one around it."""
+    name = reference.get("dictionary", "")
+    for depth in range(len(path), -1, -1):
+        if (place := structure.dictionaries.get((*path[:depth], "", name))) is not None:
+            return place
+    raise SspError(
+        f"there is no signal dictionary {name!r}, to which {reference.get('name')!r} refers", reference
+    )
+
+
+def _connectors(
+    element: _Element,
+    definitions: Mapping[str, UnitDefinition],
+    tag: str = f"{{{SSD}}}Connectors/{{{SSD}}}Connector",
+) -> dict[str, SspVariable]:
     connectors: dict[str, SspVariable] = {}
-    for connector in element.iterfind(f"{{{SSD}}}Connectors/{{{SSD}}}Connector"):
+    for connector in element.iterfind(tag):
         unit = next((kind.get("unit") for kind in connector if kind.get("unit")), None)
         shape = _whole(dimension.get("size") for dimension in connector.iterfind(f"{{{SSC}}}Dimension"))
         declared = SspVariable(connector.get("kind", ""), unit, definitions.get(str(unit)), shape=shape)
@@ -558,12 +646,14 @@ def _elements_at(
 def _end(structure: SspStructure, connection: _Element, which: str, path: ElementPath) -> SspEnd:
     element, name = connection.get(f"{which}Element"), connection.get(f"{which}Connector", "")
     inner = (*path, element) if element else path
+    inner = structure.dictionaries.get(inner, inner)
     if inner not in structure.connectors:
         raise SspError(
             f"a connection names {element!r}: there is no such component", connection, code="file-missing"
         )
     if inner not in structure.components and name not in structure.connectors[inner]:
-        system = f"the system {'.'.join(inner)}" if inner else "the system"
+        of = "the " if inner in structure.dictionaries.values() else "the system "
+        system = of + ".".join(inner) if inner else "the system"
         raise SspError(
             f"a connection names the connector {name!r}: {system} has none of this name", connection
         )

@@ -14,8 +14,8 @@ Parameter values are bound to variables by name, first those of inner systems, t
 several values for a variable, that of the outermost system wins, on the same level the last. Unknown names
 are ignored, as the standard requires, but with a note.
 
-Unsupported features are refused by name: signal dictionaries, transformations other than linear ones in
-connections, components that are not FMUs.
+Unsupported features are refused by name: transformations other than linear ones in connections, components
+that are not FMUs.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ from .ssp_archive import (
     SspEnd,
     SspError,
     SspStructure,
-    check_version,
+    check_type,
     linear,
     number,
     read_structure,
@@ -434,9 +434,9 @@ def _spread(structure: SspStructure, end: SspEnd, given: Array) -> Iterator[tupl
 def _bound(archive: SspArchive, element: _Element, unmapped: list[str]) -> Iterator[tuple[str, Array]]:
     """Yield (name, values) of an element's parameter bindings; add names that map nothing to `unmapped`."""
     for binding in element.iterfind(f"{{{SSD}}}ParameterBindings/{{{SSD}}}ParameterBinding"):
-        _check_type(binding, VALUES_TYPE)
-        values = _content(
-            archive, binding, f"{{{SSD}}}ParameterValues/", f"{{{SSV}}}ParameterSet", "parameters"
+        check_type(binding, VALUES_TYPE)
+        values = archive.content(
+            binding, f"{{{SSD}}}ParameterValues/", f"{{{SSV}}}ParameterSet", "parameters"
         )
         mapping = _mapping(archive, binding)
         definitions = unit_definitions(values.iterfind(f"{{{SSV}}}Units/*"))
@@ -455,26 +455,13 @@ def _bound(archive: SspArchive, element: _Element, unmapped: list[str]) -> Itera
         unmapped += [name for name in mapping or () if name not in names]
 
 
-def _content(archive: SspArchive, element: _Element, inside: str, tag: str, what: str) -> _Element:
-    """Return the content of a binding or mapping: that in place, or that of the member it names."""
-    content, source = element.find(inside + tag), element.get("source")
-    if content is not None and source:
-        raise SspError(f"{what} are given both in place and by the source {source!r}", element)
-    if content is None and not source:
-        raise SspError(f"{what} are bound that are nowhere", element)
-    if content is None:
-        return archive.xml(archive.member(element), tag)
-    check_version(content)
-    return content
-
-
 def _mapping(archive: SspArchive, binding: _Element) -> dict[str, list[_Element]] | None:
     """Return the entries of a binding's mapping by source name, None if it has no mapping."""
     mapping = binding.find(f"{{{SSD}}}ParameterMapping")
     if mapping is None:
         return None
-    _check_type(mapping, MAPPING_TYPE)
-    content = _content(archive, mapping, "", f"{{{SSM}}}ParameterMapping", "mappings")
+    check_type(mapping, MAPPING_TYPE)
+    content = archive.content(mapping, "", f"{{{SSM}}}ParameterMapping", "mappings")
     entries: dict[str, list[_Element]] = {}
     targets: set[str] = set()
     for entry in content.iterfind(f"{{{SSM}}}MappingEntry"):
@@ -483,13 +470,6 @@ def _mapping(archive: SspArchive, binding: _Element) -> dict[str, list[_Element]
             raise SspError(f"two parameters are mapped to {target!r}", entry)
         targets.add(target)
     return entries
-
-
-def _check_type(element: _Element, allowed: str) -> None:
-    if element.get("type", allowed) != allowed:
-        raise SspError(
-            f"{element.get('type')} is not supported: only {allowed} is", element, code="ssp-unsupported"
-        )
 
 
 def _transformed(value: SspValue, entry: _Element) -> SspValue:

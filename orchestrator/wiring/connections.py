@@ -18,7 +18,7 @@ from itertools import pairwise
 from yawbench.fmus.fmu import Variable
 from yawbench.foundation.messages import fold, hint, listed
 
-from ..plan import Wire
+from ..plan import PARAMETERS, Wire
 from ..scenario.loader import Connection
 from ..scenario.quantities import conversion, measure_of, parse_unit, unit_of
 from ..scenario.yaml_lines import KeyPath, dotted
@@ -120,6 +120,9 @@ class Connector:
             return []
         (target, to_pattern) = ends[1]
         inputs = self._system.matching_inputs(target, to_pattern)
+        arrays = self._arrays(ends[0], ends[1])
+        if arrays is not None:
+            return self._between_arrays(*arrays, connection, key)
         if not inputs:
             self._no_such((*key, "to"), target, to_pattern, "input")
         if ends[0] is None:
@@ -159,6 +162,41 @@ class Connector:
                 "connection-matches-nothing",
             )
         return [Wire(source, output, target, name) for (source, output), name in pairs]
+
+    def _arrays(
+        self, source: SignalName | list[str] | None, target: SignalName
+    ) -> tuple[list[Variable], list[Variable]] | None:
+        """Return the elements of the ends of a connection, if one of them at least is a whole array."""
+        if not isinstance(source, SignalName) or "*" in source.variable + target.variable:
+            return None
+        ends = (source, "output", self._outputs), (target, "input", self._inputs)
+        scalars = [[v for v in (known[n.instance].get(n.variable),) if v] for n, _, known in ends]
+        arrays = [self._fmus[n.instance].elements_of(n.variable, kind) for n, kind, _ in ends]
+        outputs, inputs = (array or scalar for array, scalar in zip(arrays, scalars, strict=True))
+        return (outputs, inputs) if any(arrays) and outputs and inputs else None
+
+    def _between_arrays(
+        self, outputs: list[Variable], inputs: list[Variable], connection: Connection, key: KeyPath
+    ) -> list[Wire]:
+        """Return the wires between two arrays of one size; report sizes that differ."""
+        source, target = connection.source, connection.target
+        assert isinstance(source, SignalName)
+        assert isinstance(target, SignalName)
+        if source.instance == target.instance:
+            self._report(key, f"connects {target.instance} to itself", "connection-invalid")
+            return []
+        of, to = ([v.name[len(v.array) :] for v in end] for end in (outputs, inputs))
+        if of != to:
+            has, takes = (end[-1].strip("[]").replace(",", "x") or "one" for end in (of, to))
+            sentence = (
+                f"cannot connect {source} to {target}: the former has {has} elements, the latter {takes}"
+            )
+            self._report(key, sentence, "wiring-size-mismatch")
+            return []
+        return [
+            Wire(source.instance, output.name, target.instance, element.name)
+            for output, element in zip(outputs, inputs, strict=True)
+        ]
 
     def _refuse_twice(self, names: list[str], key: KeyPath) -> None:
         if twice := next((name for name in names if names.count(name) > 1), None):
@@ -217,7 +255,8 @@ class Connector:
         if variable is not None:
             self._report(
                 key,
-                f"{instance}.{pattern} is not an {kind}: its causality is {variable.causality}",
+                f"{instance}.{pattern} is not an {kind}: its causality is {variable.causality}"
+                + (f", and {variable.variability}" if variable.causality in PARAMETERS else ""),
                 "variable-wrong-kind",
             )
             return

@@ -22,7 +22,7 @@ from ..scenario.yaml_lines import KeyPath
 from ..signal_names import SignalName
 from .context import WiringContext, facts_of
 from .domain import Domain, Measured
-from .parameters import value_for
+from .parameters import value_for, values_of_array
 
 if TYPE_CHECKING:
     import numpy as np
@@ -74,6 +74,16 @@ def constants(system: WiringContext, domain: Domain) -> dict[Input, Constant]:
             for u in instances
             for part, name in system.matching_inputs(u, name_pattern).items()
         }
+        each: dict[Input, Given[Any]] = dict.fromkeys(parts, given)
+        if not parts:
+            arrays = [(u, e) for u in instances if (e := fmus[u].elements_of(name_pattern, "input"))]
+            try:
+                for u, elements in arrays:
+                    each |= {(u, name): one for name, one in values_of_array(elements, given).items()}
+            except ValueError as error:
+                system.report(given.where, str(error))
+                continue
+            parts = dict.fromkeys(each, "")
         if not parts and system.had(instances, name_pattern, "input"):
             system.note(
                 "left-out-after-swap",
@@ -87,18 +97,19 @@ def constants(system: WiringContext, domain: Domain) -> dict[Input, Constant]:
                 "variable-unknown",
             )
         for (instance, name), part in parts.items():
-            variable = inputs[instance][name]
+            variable, own = inputs[instance][name], each[instance, name]
             value: Value | InputSeries = 0
             try:
-                if isinstance(given.value, SeriesSpec):
+                if isinstance(own.value, SeriesSpec):
                     assert read is not None
-                    value = read(given.value, part, variable)
+                    value = read(own.value, part, variable)
                 else:
-                    value = value_for(variable, given.value)
+                    value = value_for(variable, own.value)
             except ValueError as error:
                 system.report(given.where, f"{error}, for {instance}.{name}", code_of(error))
             precedence = CHANGED_INPUTS if fact_changed and given.changed else INPUTS
-            constant = Constant(value, key, given, of_instance, "*" not in pattern, precedence)
+            exact = "*" not in pattern and own is given  # an element takes precedence over its array
+            constant = Constant(value, key, own, of_instance, exact, precedence)
             other = by_input.setdefault((instance, name), constant)
             if other.rank < constant.rank:
                 by_input[instance, name] = constant

@@ -15,7 +15,7 @@ from yawbench.foundation.errors import Diagnostic, Location, Severity, WiringErr
 from yawbench.foundation.messages import fold_sentences
 from yawbench.vocabulary.facts import FACTS, Fact
 
-from ..plan import Given, Instance, Plan
+from ..plan import PARAMETERS, Given, Instance, Plan
 from ..scenario.loader import LoadedScenario
 from ..scenario.yaml_lines import MOST_ERRORS, KeyPath
 from ..signal_names import OF_RUN, SignalName, Target, match, matching
@@ -57,7 +57,7 @@ class WiringContext:
     def given(self) -> dict[str, dict[str, Given[Any]]]:
         """Instance -> parameter or constant -> its value as given, at first the start value of the FMU."""
         return {
-            instance: {variable.name: Given(variable.start) for variable in fmu.of("parameter")}
+            instance: {v.name: Given(v.start) for kind in PARAMETERS for v in fmu.of(kind)}
             for instance, fmu in self.fmus.items()
         }
 
@@ -144,7 +144,7 @@ def reached(plan: Plan, target: Target) -> Iterator[tuple[Instance, Variable]]:
     elif target.kind in ("parameter", "vehicle_parameter"):
         for instance in plan.instances:
             own = instance.fmu.variables.get(target.variable)
-            if target.instance in ("", instance.name) and own and own.causality == "parameter":
+            if target.instance in ("", instance.name) and own and own.causality in PARAMETERS:
                 yield instance, own
 
 

@@ -17,10 +17,11 @@ with the same numbers.
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from yawbench.fmus.description import CORE
+from yawbench.fmus.description import CORE, resized
 from yawbench.fmus.fmu import Fmu, Value, Variable, is_path
 from yawbench.fmus.opener import (
     Opener,
@@ -43,7 +44,8 @@ from yawbench.vocabulary.roles import role_in, role_of
 
 from ..plan import Given, InputSeries, Instance, Plan, Wire
 from ..scenario.loader import LoadedScenario
-from ..signal_names import SignalName, match
+from ..scenario.schema import SeriesSpec
+from ..signal_names import SignalName, match, matching
 from .connections import Connector
 from .constants import Constant, Input, constants
 from .context import WiringContext
@@ -51,6 +53,7 @@ from .control_side import exact
 from .domain import Domain
 from .faults import faults_of
 from .order import EvaluationOrder, evaluate
+from .parameters import value_for
 
 
 def missing_functions(
@@ -228,6 +231,7 @@ def make_plan(
     system = _open_all(scenario, fmus, opener or Opener())
     opened, notes = system.fmus, system.notes
     notes += [*scenario.document.notes, *stale_fmus(opened.values()), *host_needs(opened.values())]
+    _note_unusable(system)
     distributed = domain.parameters(system)
     parameters = distributed.of_instances()
     by_input = constants(system, domain)
@@ -347,11 +351,21 @@ def _open_all(scenario: LoadedScenario, fmus: Path | None, opener: Opener) -> Wi
         except ModelDescriptionError:
             return None
 
+    def fitted(name: str, fmu: Fmu) -> Fmu:
+        """Return the FMU of an instance with the sizes of its arrays, its driven parameters as inputs."""
+        sizes, driven = _sizes(scenario, name, fmu), _driven(scenario, name, fmu)
+        if not sizes and not driven:
+            return fmu
+        known = fmu.sha256, tuple(sizes.items()), driven
+        if known not in opened_fmus:
+            opened_fmus[known] = (resized(fmu, sizes) if sizes else fmu).driven(driven)
+        return opened_fmus[known]
+
     fmus_by_name: dict[str, Fmu] = {}
     not_built: dict[Diagnostic, None] = {}
     for name, spec in scenario.units.items():
         try:
-            fmus_by_name[name] = opened(spec.fmu, spec.validate_)
+            fmus_by_name[name] = fitted(name, opened(spec.fmu, spec.validate_))
         except BuildError as error:  # noqa: PERF203 - all errors are collected
             not_built.update(dict.fromkeys(error.diagnostics))
         except ModelDescriptionError as error:
@@ -366,6 +380,48 @@ def _open_all(scenario: LoadedScenario, fmus: Path | None, opener: Opener) -> Wi
         raise ModelDescriptionError(errors)
     names = [spec.fmu for spec in scenario.units.values() if not is_path(spec.fmu)]
     return WiringContext(scenario, fmus_by_name, replaced, hidden(names, folder, packages=False))
+
+
+def _sizes(scenario: LoadedScenario, instance: str, fmu: Fmu) -> dict[str, Value]:
+    """Return the structural parameters of an instance that change; values not allowed are reported later."""
+    sizes: dict[str, Value] = {}
+    for variable in fmu.of("structuralParameter"):
+        given = scenario.units[instance].parameters.get(variable.name)
+        with suppress(ValueError):
+            value = variable.start if given is None else value_for(variable, given.value)  # type: ignore[arg-type]
+            sizes |= {variable.name: value} if value is not None and value != variable.start else {}
+    return sizes
+
+
+def _driven(scenario: LoadedScenario, instance: str, fmu: Fmu) -> frozenset[str]:
+    """Return the tunable parameters of an instance that connections or time series drive.
+
+    A name is taken for a parameter if it is that of no input.
+    """
+    series = [SignalName.parse(k) for k, v in scenario.inputs.items() if isinstance(v.value, SeriesSpec)]
+    named = [c.target for c in scenario.connections if isinstance(c.target, SignalName)] + series
+    patterns = {name.variable for name in named if name.instance == instance}
+    tunable = {v.name: v for v in fmu.of("parameter") if v.variability == "tunable"} if patterns else {}
+    if not tunable:
+        return frozenset()
+    inputs = {v.name for v in fmu.variables.values() if v.causality == "input"}
+    driven: set[str] = set()
+    for pattern in patterns:
+        if not matching(pattern, inputs) and not fmu.elements_of(pattern, "input"):
+            driven.update(matching(pattern, tunable).values())
+            driven.update(v.name for v in fmu.elements_of(pattern, "parameter") if v.name in tunable)
+    return frozenset(driven)
+
+
+def _note_unusable(system: WiringContext) -> None:
+    """Note variables that this master cannot use."""
+    for instance, fmu in system.fmus.items():
+        reasons: dict[str, list[str]] = {}
+        for name, why in fmu.refused.items():
+            reasons.setdefault(why, []).append(name)
+        for why, names in reasons.items():
+            each = "each " if len(names) > 1 else ""
+            system.note("variable-unsupported", f"{instance} ({fmu.name}): {listed(fold(names))} {each}{why}")
 
 
 def _check_instances(system: WiringContext) -> None:

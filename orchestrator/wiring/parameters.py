@@ -6,8 +6,10 @@ instance that takes them.
 
 from __future__ import annotations
 
+import json
 import sys
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, ClassVar
@@ -17,9 +19,9 @@ from yawbench.foundation.errors import Diagnostic, code_of
 from yawbench.foundation.messages import closest, fold, hint, listed, short
 from yawbench.foundation.safe_files import TEXT, read_bytes
 
-from ..plan import LITERATURE, Given, Instance, ValueOrigin, ValueSource
+from ..plan import LITERATURE, PARAMETERS, Given, Instance, ValueOrigin, ValueSource
 from ..scenario import quantities
-from ..scenario.schema import TextSpec
+from ..scenario.schema import TextSpec, array_value
 from .context import WiringContext, facts_of
 
 LARGEST, LARGEST_SINGLE = sys.float_info.max, (2 - 2**-23) * 2.0**127
@@ -32,6 +34,8 @@ def value_for(variable: Variable, raw: Value) -> Value:
     Raises:
         ValueError: the value is not allowed; the message says what is.
     """
+    if isinstance(raw, list):
+        raise ValueError(f"takes one value (got {short(raw)})")
     convert = {"Real": _real, "Integer": _integer, "Enumeration": _enumeration}.get(variable.type, _other)
     value = convert(variable, raw)
     unit = f" {variable.unit}" if variable.unit and variable.unit != "1" else ""
@@ -89,6 +93,38 @@ def _other(variable: Variable, raw: Value) -> Value:
     return raw
 
 
+def values_of_array(elements: Sequence[Variable], given: Given[Any]) -> dict[str, Given[Any]]:
+    """Return the values of the elements of an array by name, from a list, or one with a list for every row.
+
+    An option gives the list as text, `[[1, 2], [3, 4]]`.
+
+    Raises:
+        ValueError: it is no list, or has not as many values as the array has elements.
+    """
+    sizes = elements[-1].name.rpartition("[")[2][:-1].split(",")
+    values = given.value
+    if isinstance(values, str) and values.startswith("["):
+        with suppress(ValueError):
+            values = array_value(json.loads(values))
+    if _shape(values) not in (tuple(map(int, sizes)), (len(elements),)):
+        raise ValueError(
+            f"{elements[0].array} is an array of {'x'.join(sizes)} elements and takes a list of "
+            f"{len(elements)} values, row by row (got {short(given.value)})"
+        )
+    while isinstance(values[0], list):
+        values = [one for row in values for one in row]
+    return {v.name: replace(given, value=one) for v, one in zip(elements, values, strict=True)}
+
+
+def _shape(value: object) -> tuple[int, ...] | None:
+    """Return the shape of nested lists, () of a single value, None if rows differ in their lengths."""
+    if not isinstance(value, list):
+        return ()
+    inner = {_shape(item) for item in value}
+    row = inner.pop()
+    return None if inner or row is None else (len(value), *row)
+
+
 class Parameters:
     """The parameters of all instances: their own, else facts, else the vehicle file's values.
 
@@ -114,9 +150,11 @@ class Parameters:
         by_change = self._from_facts()
         shared = {instance: dict(values) for instance, values in self.values.items()}
         for instance in self.fmus:
-            for name, given in self.scenario.units[instance].parameters.items():
+            own = self.scenario.units[instance].parameters.items()
+            for name, given in sorted(own, key=lambda item: not isinstance(item[1].value, list)):
                 if (instance, name) not in by_change or given.changed:
                     self._give_own(instance, name, given)
+            self._check_arrays(instance)
         self.settle(shared)
         return self.values
 
@@ -167,10 +205,33 @@ class Parameters:
         """Return the instances that have a parameter."""
         return [instance for instance, fmu in self.fmus.items() if is_parameter(fmu, name)]
 
-    def _give_own(self, instance: str, name: str, given: Given[Value | TextSpec]) -> None:
-        """Set a parameter listed under its instance: to a value, or the text of a file."""
+    def _check_arrays(self, instance: str) -> None:
+        """Report arrays of which some elements have neither a value nor a start value."""
+        fmu, given = self.fmus[instance], self.values[instance]
+        arrays = {fmu.variables[name].array for name in given if fmu.variables[name].elements > 1}
+        for array in arrays:
+            elements = fmu.elements_of(array, "parameter")
+            lacking = [v.name for v in elements if v.name not in given and v.start is None]
+            if lacking:
+                where = next(self.system.given[instance][v.name].where for v in elements if v.name in given)
+                sentence = (
+                    f"{instance}.{fold(lacking)[0]} has no value and no start value: give all of {array}"
+                )
+                self.system.report(where, sentence, "value-invalid")
+
+    def _give_own(self, instance: str, name: str, given: Given[Value | TextSpec | list[Any]]) -> None:
+        """Set a parameter listed under its instance: to a value, those of an array, or the text of a file."""
         fmu, value = self.fmus[instance], given.value
-        if not is_parameter(fmu, name):
+        elements = fmu.elements_of(name, "parameter")  # none for the name of a scalar
+        if elements and not isinstance(value, TextSpec):
+            try:
+                each = values_of_array(elements, given)
+            except ValueError as error:
+                self.system.report(given.where, str(error), "value-invalid")
+                return
+            for element, one in each.items():
+                self.give(instance, element, one)
+        elif not is_parameter(fmu, name):
             if self._is_left_out(instance, name, given):
                 sentence = f"{instance}.{name} is left out: {fmu.name} has no such parameter"
                 self.system.note("left-out-after-swap", sentence)
@@ -242,17 +303,12 @@ def _text_of(path: Path) -> str:
 
 def is_parameter(fmu: Fmu, name: str) -> bool:
     """Return whether an FMU has a parameter of this name."""
-    return name in fmu.variables and fmu.variables[name].causality == "parameter"
+    return name in fmu.variables and fmu.variables[name].causality in PARAMETERS
 
 
 def _unknown(instance: str, fmu: Fmu, name: str) -> str:
     if name in fmu.variables and fmu.variables[name].causality == "input":
-        return f"{name!r} is an input of {instance}, not a parameter: give constants under 'inputs'"
-    if name in fmu.variables and fmu.variables[name].causality == "structuralParameter":
-        start = fmu.variables[name].start
-        return (
-            f"{name!r} of {instance} is a structural parameter, which can only keep its start value, {start}"
-        )
+        return f"{name!r} is an input of {instance} here, not a parameter: give constants under 'inputs'"
     if name in fmu.refused:
         return f"{instance}.{name} {fmu.refused[name]}"
     names = fold([v.name for v in fmu.of("parameter")])

@@ -35,11 +35,11 @@ typedef struct {
     int32_t i32[2];
     uint32_t u32[2];
     int64_t i64[2], mode[2];
-    uint64_t u64[2], size;
+    uint64_t u64[2], size, wanted, length; /* of Sized: as told, and as of the last configuration mode */
     bool flag[2];
     char text[2][64];
     /* states and parameters of the others */
-    double x[2], p[2], matrix[4], u[2], y[2];
+    double x[2], p[2], matrix[4], u[2], y[2], v[16], w[16], k;
     int32_t counter;
 } Instance;
 
@@ -69,6 +69,13 @@ static double *moreFloat64(Instance *in, Reference r, size_t *n)
     if (r >= 31 && r <= 34) {
         return scalars[r - 31];
     }
+    if (r == 51 || r == 52) {
+        *n = in->length;
+        return r == 51 ? in->v : in->w;
+    }
+    if (r == 53) {
+        return &in->k;
+    }
     *n = r == 41 ? 4 : 2;
     return r == 41 ? in->matrix : r == 42 ? in->u : r == 43 ? in->y : NULL;
 }
@@ -77,7 +84,10 @@ static int64_t *moreInt64(Instance *in, Reference r, size_t *n)
 {
     return r == 25 || r == 26 ? &in->mode[r - 25] : NULL;
 }
-static uint64_t *moreUInt64(Instance *in, Reference r, size_t *n) { return r == 40 ? &in->size : NULL; }
+static uint64_t *moreUInt64(Instance *in, Reference r, size_t *n)
+{
+    return r == 40 ? &in->size : r == 50 ? &in->wanted : NULL;
+}
 #define NO_MORE(Type, c_type) \
     static c_type *more##Type(Instance *in, Reference r, size_t *n) { return NULL; }
 NO_MORE(Float32, float)
@@ -96,6 +106,9 @@ static void update(Instance *in)
 #define PASS(Type, c_type, first, field) in->field[1] = in->field[0];
     EACH_TYPE(PASS)
     in->mode[1] = in->mode[0];
+    for (size_t i = 0; i < in->length; i++) {
+        in->w[i] = in->k * in->v[i];
+    }
     snprintf(in->text[1], sizeof in->text[1], "<%s>", in->text[0]);
     for (int i = 0; i < 2; i++) {
         in->y[i] = in->matrix[2 * i] * in->u[0] + in->matrix[2 * i + 1] * in->u[1];
@@ -163,6 +176,8 @@ EXPORT void *fmi3InstantiateCoSimulation(Text name, Text token, Text resources, 
     in->environment = environment;
     in->log = log;
     in->size = 2;
+    in->wanted = in->length = 3;
+    in->k = 1;
     in->x[0] = is(in, "VanDerPol") ? 2 : 1;
     in->p[0] = is(in, "BouncingBall") ? -9.81 : 1;
     in->p[1] = 0.7;
@@ -172,6 +187,13 @@ EXPORT void *fmi3InstantiateCoSimulation(Text name, Text token, Text resources, 
 }
 
 EXPORT void fmi3FreeInstance(void *c) { free(c); }
+
+EXPORT int fmi3ExitConfigurationMode(void *c)
+{
+    Instance *in = c;
+    in->length = in->wanted;
+    return in->length <= 16 ? OK : ERROR;
+}
 
 EXPORT int fmi3EnterInitializationMode(void *c, bool tolerant, double tolerance, double start, bool stops, double stop)
 {
@@ -228,6 +250,7 @@ EXPORT int fmi3DoStep(void *c, double t, double h, bool keep, bool *event, bool 
 
 #define ALWAYS_OK(Name) \
     EXPORT int fmi3##Name(void *c) { return OK; }
+ALWAYS_OK(EnterConfigurationMode)
 ALWAYS_OK(ExitInitializationMode)
 ALWAYS_OK(Terminate)
 ALWAYS_OK(Reset)

@@ -81,13 +81,19 @@ MODELS: dict[str, list[str]] = {
         variable("Float64", "u", 42, "input", _VECTOR + '<Alias name="force"/>', start="0 0"),
         variable("Float64", "y", 43, "output", _SIZED + '<Alias name="result"/>'),
     ],
+    "Sized": [
+        variable("UInt64", "m", 50, "structuralParameter", start=3, min=1),
+        variable("Float64", "v", 51, "input", '<Dimension valueReference="50"/>', start="1 2 3"),
+        variable("Float64", "w", 52, "output", '<Dimension valueReference="50"/>'),
+        variable("Float64", "k", 53, "parameter", start=1, variability="tunable"),
+    ],
     "Early": [_state("x", 31, 1), _state("gone", 32, 0)],
     "Stuck": [_state("x", 31, 1)],
     "Deaf": [_state("x", 31, 1), _parameter("k", 33, 1, unit="1/s")],
     "Refusing": [_state("x", 31, 1)],
 }
 """Model -> its variables."""
-FOLLOWS = {43: "42", 26: "25", 24: "23"} | {2 + 2 * i: str(1 + 2 * i) for i in range(len(TYPES))}
+FOLLOWS = {52: "51", 43: "42", 26: "25", 24: "23"} | {2 + 2 * i: str(1 + 2 * i) for i in range(len(TYPES))}
 """Reference of an output -> those of the inputs that it follows."""
 
 

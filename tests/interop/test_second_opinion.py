@@ -50,7 +50,7 @@ def plan_of(fmus, scenario="fuzzy_feedback/single_sine.yaml", stop_time=0.1, set
     return make_plan(load_scenario(SCENARIOS / scenario, changes=changes), fmus=fmus)
 
 
-@pytest.mark.parametrize("scenario", [name for name in PAPERS if name != "fuzzy_feedback/single_sine.yaml"])
+@pytest.mark.parametrize("scenario", PAPERS)
 @pytest.mark.sampled(1)
 def test_libcosim_and_ecos_agree_with_jacobi_to_a_billionth_of_every_signals_range(scenario, fmus, tmp_path):
     plan = plan_of(fmus, scenario, PAPERS[scenario])

@@ -15,7 +15,7 @@ from yawbench.foundation.errors import YawbenchError
 from yawbench.interop.ssp_write import for_omsimulator, system_structure, write_ssp
 from yawbench.orchestrator.plan import Plan, Wire
 from yawbench.orchestrator.scenario.loader import load_scenario
-from yawbench.orchestrator.scenario.ssp_archive import SSC, SSD, SSV
+from yawbench.orchestrator.scenario.ssp_archive import SSB, SSC, SSD, SSV
 from yawbench.orchestrator.wiring.make_plan import make_plan
 
 pytestmark = pytest.mark.usefixtures("common_cache")
@@ -111,6 +111,66 @@ def test_units_of_connectors_are_converted(of, to, start, end, gain, tmp_path):
     fmus(tmp_path, of, to)
     elements = component("a", connector("y", "output", start)) + component("b", connector("x", "input", end))
     assert scale(archive(tmp_path, elements, wire("a.y", "b.x"))) == (gain, 0.0)
+
+
+def reference(name: str, *connectors: str) -> str:
+    return (
+        f'<ssd:SignalDictionaryReference name="{name}" dictionary="d">'
+        f"<ssd:Connectors>{''.join(connectors)}</ssd:Connectors></ssd:SignalDictionaryReference>"
+    )
+
+
+def dictionary(unit: str | None = None, **attributes: str) -> str:
+    more = "".join(f' {key}="{value}"' for key, value in attributes.items())
+    measure = f' unit="{unit}"' if unit else ""
+    inner = (
+        f'<ssb:SignalDictionary xmlns:ssb="{SSB}" version="1.0"><ssb:DictionaryEntry name="angle">'
+        f"<ssc:Real{measure}/></ssb:DictionaryEntry></ssb:SignalDictionary>"
+    )
+    return (
+        f'<ssd:SignalDictionaries><ssd:SignalDictionary name="d"{more}>{"" if more else inner}'
+        "</ssd:SignalDictionary></ssd:SignalDictionaries>"
+    )
+
+
+IN_SYSTEM = (
+    '<ssd:System name="inner"><ssd:Elements>{elements}</ssd:Elements>'
+    "<ssd:Connections>{connections}</ssd:Connections></ssd:System>"
+)
+
+
+@pytest.mark.parametrize(("unit", "gain"), [(None, 0.5), ("deg", 90 / math.pi), ("rad", 0.5)])
+def test_a_signal_dictionary_passes_its_source_on_to_all_that_refer_to_it(unit, gain, tmp_path):
+    fmus(tmp_path, "rad", None)
+    inner = IN_SYSTEM.format(
+        elements=component("b", connector("x", "input")) + reference("there", connector("angle", "inout")),
+        connections=wire("b.x", "there.angle", '<ssc:LinearTransformation factor="0.5"/>'),
+    )
+    elements = (
+        component("a", connector("y", "output")) + reference("here", connector("angle", "inout")) + inner
+    )
+    path = archive(tmp_path, elements, wire("a.y", "here.angle"), bindings=dictionary(unit))
+    (only,) = plan_of(path).wires
+    assert (only.source, only.output, only.target, only.input) == ("a", "y", "inner_b", "x")
+    assert (only.gain, only.offset) == (pytest.approx(gain, rel=1e-12), 0.0)
+
+
+@pytest.mark.parametrize(
+    ("connections", "given", "names"),
+    [
+        (wire("a.y", "bus.speed"), dictionary(), ("'speed'", "signal dictionary d")),
+        (wire("a.y", "bus.angle"), "", ("'d'", "'bus'")),
+        (wire("a.y", "bus.angle"), dictionary(source="d.ssb"), ("d.ssb",)),
+        (wire("a.y", "bus.angle"), dictionary(type="text/csv"), ("text/csv",)),
+        (wire("a.y", "bus.angle") + wire("b.z", "bus.angle"), dictionary(), ("a.y", "b.z")),
+    ],
+)
+def test_a_signal_dictionary_that_cannot_be_is_refused(connections, given, names, tmp_path):
+    fmus(tmp_path, "rad", "rad")
+    text = (
+        component("a", connector("y", "output")) + component("b", connector("x", "input")) + reference("bus")
+    )
+    assert mentions(problem(archive(tmp_path, text, connections, bindings=given)), *names)
 
 
 ENDS = component("a", connector("y", "output", "deg")) + component("b", connector("x", "input", "rad"))

@@ -15,7 +15,7 @@ from tests.changed import changed
 from tests.conftest import compiled
 from tests.fmus import models3
 from tests.fmus.fake_fmus import Var, make_fmu
-from tests.refusals import texts_of
+from tests.refusals import mentions, texts_of
 from yawbench.cli import main
 from yawbench.foundation.errors import YawbenchError
 from yawbench.interop.ssp_write import write_ssp
@@ -310,6 +310,27 @@ def test_an_archive_without_the_default_description_names_the_others(tmp_path):
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("fast.ssd", description(""))
     assert f"{path}/fast.ssd" in str(problem(path))
+
+
+def test_a_description_in_a_folder_is_run_with_the_files_beside_it(tmp_path):
+    make_fmu(tmp_path / "g.fmu", outputs=["y"], parameters=FMI2.values())
+    packed = pack(
+        tmp_path,
+        description(binding(source="resources/values.ssv")),
+        {"resources/values.ssv": parameters(parameter("g.k", '<ssv:Real value="3"/>'))},
+    )
+    folder = tmp_path / "unpacked"
+    with zipfile.ZipFile(packed) as archive:
+        archive.extractall(folder)
+    (plan, same) = plan_of(folder / "SystemStructure.ssd"), plan_of(packed)
+    assert plan.instances[0].parameters == same.instances[0].parameters == {"k": 3.0}
+    assert plan.instances[0].fmu.sha256 == same.instances[0].fmu.sha256
+    (folder / "resources" / "values.ssv").unlink()
+    assert mentions(str(problem(folder / "SystemStructure.ssd")), "resources/values.ssv")
+    assert mentions(str(problem(folder / "Other.ssd")), "no such file")
+    outside = description(binding(source="../values.ssv"))
+    (folder / "SystemStructure.ssd").write_text(outside, encoding="utf-8")
+    assert mentions(str(problem(folder / "SystemStructure.ssd")), "../values.ssv")
 
 
 # Arrays

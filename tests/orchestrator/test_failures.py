@@ -204,16 +204,18 @@ def test_a_warning_without_a_message_is_reported_too(tmp_path):
     assert each_mentions([(m.instance, m.text) for m in info.warnings], ("Warning", "gave", "reason"))
 
 
-def test_an_error_logged_during_initialization_ends_the_run_although_the_status_is_ok(tmp_path):
+def test_an_error_logged_during_initialization_is_a_warning_if_the_status_is_ok(tmp_path):
     class Slave(FakeSlave):
         def enter(self):
-            self.log.add(self.name, ERROR, "", "initialization failed at t = 0 s: ValueError: mass is -1")
+            self.log.add(self.name, ERROR, "", "no table of mass, -1 is taken")
             return OK
 
-    sentence, results, slaves = answer(tmp_path, Slave)
-    assert mentions(sentence, "target", "0 s", "ValueError", "-1", "mass")
-    assert len(results.time) == 0
-    assert [slave.freed for slave in slaves.values()] == [1, 1]
+    units = {"source": Clock(x=lambda t: t), "target": Passing()}
+    info = simulate(
+        make_plan(units, ["source.x -> target.x"]), tmp_path, opener=Opener(units, "target", Slave)
+    )
+    assert each_mentions([f"{m.instance}: {m.text}" for m in info.warnings], ("target", "mass", "-1"))
+    assert load_results(tmp_path).time[-1] > 0
 
 
 def test_an_instance_that_cannot_be_made_frees_those_made_before(tmp_path):

@@ -234,6 +234,123 @@ def test_arrays_are_wired_set_and_recorded_element_by_element(run, library, tmp_
 
 
 @mostly_together
+def test_whole_arrays_are_given_and_connected(run, isolate):
+    units = {
+        "m": ("Matrix", {"parameters": {"A": [[1.0, 2.0], [3.0, 4.0]]}}),
+        "n": ("Matrix", {"parameters": {"A": [1, 0, 0, 2], "A[2,1]": 5.0}}),
+    }
+    wires = [{"from": "m.y", "to": "n.u", "gain": 10}]
+    status, said, results = run(units, *isolate, inputs={"m.force": [7, 8]}, connections=wires)
+    assert status == 0, said
+    assert [results[f"m.y[{i}]"][-1] for i in (1, 2)] == [7 + 16, 21 + 32]
+    assert [results[f"n.y[{i}]"][-1] for i in (1, 2)] == [230, 5 * 230 + 2 * 530]
+
+
+def test_options_give_whole_arrays(run):
+    options = ("--set", "m.A=[[1, 2], [3, 4]]", "--set", "inputs.m.u=[7, 8]")
+    status, said, results = run({"m": ("Matrix", {})}, *options, inputs={"m.u": [0, 0]})
+    assert status == 0, said
+    assert [results[f"m.y[{i}]"][-1] for i in (1, 2)] == [7 + 16, 21 + 32]
+    status, said, _ = run({"m": ("Matrix", {})}, "--set", "m.A=[1, nan, 3, 4]", inputs={"m.u": [0, 0]})
+    assert status == 2
+    assert mentions(said, "--set m.A", "2x2", "4")
+
+
+def test_an_element_takes_precedence_over_its_array(run):
+    status, said, results = run({"m": ("Matrix", {})}, inputs={"m.u[2]": 3.0, "m.u": [7, 8]})
+    assert status == 0, said
+    assert [results[f"m.y[{i}]"][-1] for i in (1, 2)] == [7, 3]
+
+
+@pytest.mark.parametrize(
+    ("parameters", "inputs", "wires", "names"),
+    [
+        ({"A": [1, 2, 3]}, {"u": [1, 2]}, [], ("A", "2x2", "4", "[1, 2, 3]")),
+        ({"A": [[1, 2], [3]]}, {"u": [1, 2]}, [], ("A", "2x2", "4")),
+        ({"A": 5.0}, {"u": [1, 2]}, [], ("A", "2x2", "4", "5.0")),
+        ({"A": [1, 2, 3, "x"]}, {"u": [1, 2]}, [], ("A", "number", "x")),
+        ({}, {"u": 5.0}, [], ("u", "2", "5.0")),
+        ({}, {"u": [1, 2, 3]}, [], ("u", "2", "[1, 2, 3]")),
+        ({}, {"u[1]": [1, 2], "u[2]": 1}, [], ("m.u[1]", "one value")),
+        ({}, {"u": [1, 2]}, [{"from": "s.w", "to": "n.u"}], ("s.w", "n.u", "3", "2")),
+        ({}, {"u": [1, 2]}, [{"from": "d.x", "to": "n.u"}], ("d.x", "n.u", "one", "2")),
+    ],
+)
+def test_an_array_takes_as_many_values_as_it_has_elements(run, parameters, inputs, wires, names):
+    units = {
+        "m": ("Matrix", {"parameters": parameters}), "n": ("Matrix", {}),
+        "s": ("Sized", {}), "d": ("Dahlquist", {}),
+    }  # fmt: skip
+    others = {"s.v": [1, 2, 3]} if wires else {"n.u": [1, 2], "s.v": [1, 2, 3]}
+    given = {f"m.{name}": value for name, value in inputs.items()} | others
+    status, said, _ = run(units, inputs=given, connections=wires)
+    assert status == 2
+    assert mentions(said, *names)
+
+
+@together_and_apart
+def test_structural_parameters_set_the_sizes_of_arrays(run, isolate):
+    units = {"s": ("Sized", {"parameters": {"m": 5, "k": 2.0}}), "t": ("Sized", {"parameters": {"m": 5}})}
+    wires = [{"from": "s.w", "to": "t.v"}]
+    status, said, results = run(units, *isolate, inputs={"s.v": [1, 2, 3, 4, 5]}, connections=wires)
+    assert status == 0, said
+    assert [results[f"t.w[{i}]"][-1] for i in range(1, 6)] == [2, 4, 6, 8, 10]
+    assert results.record.fmus["s"].parameters == {"m": 5, "k": 2.0}
+
+
+@pytest.mark.parametrize(
+    ("sizes", "inputs", "names"),
+    [
+        ({"m": 0}, [1, 2, 3], ("m", "1", "0")),
+        ({"m": 2.5}, [1, 2, 3], ("m", "whole number", "2.5")),
+        ({"m": 2}, [1, 2, 3], ("v", "2", "[1, 2, 3]")),
+        ({"m": 200000}, [1, 2, 3], ("m = 200000", "v", "100000")),
+    ],
+)
+def test_a_size_that_cannot_be_is_refused(run, sizes, inputs, names):
+    status, said, _ = run({"s": ("Sized", {"parameters": sizes})}, inputs={"s.v": inputs})
+    assert status == 2
+    assert mentions(said, *names)
+
+
+def test_a_size_that_an_fmu_refuses_ends_the_run(run):
+    status, said, _ = run({"s": ("Sized", {"parameters": {"m": 17}})}, inputs={"s.v[*]": 1.0})
+    assert status == 1
+    assert mentions(said, "s:", "structural parameters")
+
+
+@together_and_apart
+@pytest.mark.parametrize("algorithm", ["jacobi", "gauss_seidel", "extrapolated"])
+@pytest.mark.sampled(2)
+def test_tunable_parameters_follow_wires_and_series(run, tmp_path, isolate, algorithm):
+    (tmp_path / "k.csv").write_text("time,k\n0,1\n0.5,3\n1,5\n", encoding="utf-8")
+    units = {"d": ("Dahlquist", {}), "s": ("Sized", {}), "t": ("Sized", {})}
+    inputs = {"s.v": [1, 1, 1], "t.v": [1, 2, 3], "t.k": {"file": "k.csv", "interpolation": "held"}}
+    wires = [{"from": "d.x", "to": "s.k"}]
+    status, said, results = run(units, *isolate, inputs=inputs, connections=wires, algorithm=algorithm)
+    assert status == 0, said
+    late = algorithm == "jacobi"
+    x = results["d.x"]
+    assert results["s.w[2]"].tolist() == (np.array([x[0], *x[:-1]]) if late else x).tolist()
+    k = [1.0] * 5 + [3.0] * 5 + [5.0]
+    assert results["t.w[3]"].tolist() == [3 * one for one in ([k[0], *k[:-1]] if late else k)]
+
+
+def test_a_parameter_that_is_not_tunable_follows_nothing(run):
+    units = {"d": ("Dahlquist", {}), "e": ("Dahlquist", {})}
+    status, said, _ = run(units, connections=[{"from": "d.x", "to": "e.k"}])
+    assert status == 2
+    assert mentions(said, "e.k", "parameter", "fixed")
+
+
+def test_variables_that_cannot_be_used_are_named(run):
+    status, said, _ = run({"a": ("Every", {})}, command="check", inputs=rest(units="a"))
+    assert status == 0, said
+    for name, kind in (("raw", "Binary"), ("tick", "Clock"), ("ticked", "Clock")):
+        assert mentions(said, "a (Every)", name, kind)
+
+
+@mostly_together
 def test_an_alias_of_an_input_is_another_name_for_it(run, isolate):
     units = {"d": ("Dahlquist", {}), "m": ("Matrix", {}), "n": ("Matrix", {})}
     wires = [{"from": "d.x", "to": "m.force[2]"}, {"from": "m.y[*]", "to": "n.force[*]"}]
@@ -315,7 +432,6 @@ def test_an_fmu_that_refuses_to_be_instantiated_says_why(run, isolate):
 @pytest.mark.parametrize(
     ("model", "more", "to", "names"),
     [
-        ("Matrix", {"parameters": {"n": 3}}, None, ("structural", "parameter", "start")),
         ("Every", {}, "b.raw", ("b.raw", "Binary")),
         ("Every", {}, "b.tick", ("b.tick", "Clock")),
     ],

@@ -160,9 +160,9 @@ def test_a_scenario_as_run_is_plain_data_with_the_options_in_it(file: Path) -> N
         ),
         (
             "5 deg",
-            "[1, 2]",
+            "[1, {a: 2}]",
             [("value-invalid", "a.yaml:6: units.driver.parameters.amplitude")],
-            (("a.yaml:6", "units.driver.parameters.amplitude", "[1, 2]"),),
+            (("a.yaml:6", "units.driver.parameters.amplitude", "{'a': 2}"),),
         ),
         (
             "5 deg",

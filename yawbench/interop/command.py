@@ -1,4 +1,4 @@
-"""`yawbench second-opinion` and `yawbench export-ssp`: run a scenario in other masters; export it as SSP."""
+"""`yawbench second-opinion`, `export-ssp`, `export-fmu`: a scenario in other masters, as SSP, as one FMU."""
 
 from __future__ import annotations
 
@@ -145,8 +145,10 @@ Version = Annotated[
     typer.Option("--fmi", help="Version of FMI of the FMUs; 3 is for native ones that were built here."),
 ]
 For = Annotated[
-    Literal["all", "omsimulator"],
-    typer.Option("--for", help="Omit what OMSimulator does not support, and list it."),
+    Literal["all", "libcosim", "omsimulator"],
+    typer.Option(
+        "--for", help="Write choices as numbers; omit what OMSimulator does not support, and list it."
+    ),
 ]
 
 
@@ -163,22 +165,128 @@ def export_ssp(
 
     SSP: System Structure and Parameterization. `yawbench run` accepts the archive and gives the same numbers.
     """
-    from .ssp_write import as_fmi3, for_omsimulator, write_ssp
+    from .ssp_write import as_fmi3, for_omsimulator, with_numbers, write_ssp
 
     plan = plan_of_scenario(scenario, options)
     notes = list(map(str, plan.diagnostics))
     if plan.faults:
         notes.append(f"faults are not part of the archive: {_faults_of(plan)}")
-    if for_ == "omsimulator":
-        plan, more = for_omsimulator(plan)
-        notes += more
-    for note in notes:
-        say(f"note: {note}")
     path = out or Path(f"{scenario.stem}.ssp")
-    if for_ == "omsimulator":
-        standard = standard or "1.0"  # which alone it reads
+    if for_ != "all":
+        standard = standard or "1.0"  # which alone they read
     with tempfile.TemporaryDirectory(prefix="yawbench-") as folder:
         if fmi == "3":
             plan = as_fmi3(plan, Path(folder))
+        if for_ != "all":
+            plan = with_numbers(plan, Path(folder))
+        if for_ == "omsimulator":
+            plan, more = for_omsimulator(plan)
+            notes += more
+        for note in notes:
+            say(f"note: {note}")
         write_ssp(plan, path, standard, named=out is not None)
     say(f"{path}: {len(plan.instances)} instances, {len(plan.wires)} connections")
+
+
+FmuOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--out", metavar="FILE", help="FMU to write. Default: <scenario>.fmu in the working directory."
+    ),
+]
+
+
+@takes(*CHANGES, "fmus", "no_build")
+def export_fmu(scenario: ScenarioFile, options: RunOptions, out: FmuOption = None) -> None:
+    """Write a scenario as one FMU of FMI 2.0.
+
+    Its units are stepped together inside, with the algorithm `jacobi`. Parameters and recorded outputs are
+    those of the units, named `instance.variable`. Needs the package fmu-manipulation-toolbox.
+    """
+    from .one_fmu import write_one_fmu
+
+    plan = plan_of_scenario(scenario, options)
+    path = out or Path(f"{scenario.stem}.fmu")
+    notes = [*map(str, plan.diagnostics), *write_one_fmu(plan, path, named=out is not None)]
+    if plan.faults:
+        notes.append(f"faults are not part of the FMU: {_faults_of(plan)}")
+    for note in notes:
+        say(f"note: {note}")
+    say(f"{path}: {len(plan.instances)} instances, {len(plan.wires)} connections")
+
+
+DbcFile = Annotated[
+    Path, typer.Argument(metavar="DBC", help="DBC file of a CAN network.", show_default=False)
+]
+Channels = Annotated[
+    list[str] | None,
+    typer.Argument(
+        metavar="CHANNEL=MESSAGE.SIGNAL",
+        help="Channel of a sensor and its signal. Default: list all signals.",
+    ),
+]
+BitRate = Annotated[
+    float | None,
+    typer.Option(
+        "--bit-rate", metavar="NUMBER", help="Of the bus in bit/s, for the latency. Default: none.", min=1
+    ),
+]
+Radius = Annotated[
+    float | None,
+    typer.Option("--wheel-radius", metavar="NUMBER", help="In m, of wheel speeds in km/h or m/s.", min=0.01),
+]
+
+
+@tabular
+def dbc(
+    file: DbcFile, channels: Channels = None, bit_rate: BitRate = None, wheel_radius: Radius = None
+) -> None:
+    """Print parameters of a sensor with the numbers of a CAN network.
+
+    Resolution, range, time between messages and latency, as `parameters:` of a sensor in a scenario.
+    """
+    from yawbench.studies.tables import Table
+
+    from .can_signals import read_dbc, sensor_parameters
+
+    signals = read_dbc(file)
+    if not channels:
+        headings = ["signal", "unit", "resolution", "from", "to", "cycle, ms"]
+        table = Table(str(file), headings, numbers={2, 3, 4, 5})
+        for name, one in signals.items():
+            numbers = one.scale if one.whole else 0.0, one.least, one.largest, 1000 * one.cycle
+            table.rows.append([name, one.unit, *(f"{number:g}" for number in numbers)])
+        print_tables([table])
+        return
+    pairs = dict(text.partition("=")[::2] for text in channels)
+    parameters = sensor_parameters(signals, pairs, bit_rate=bit_rate, wheel_radius=wheel_radius)
+    print(printable(f"parameters:   # {file.name}: {', '.join(channels)}"))
+    for name, value in parameters.items():
+        print(f"  {name}: {value!r}")
+
+
+ResultsFolder = Annotated[
+    Path, typer.Argument(metavar="RESULTS", help="Folder with results.", show_default=False)
+]
+Columns = Annotated[
+    list[str],
+    typer.Argument(metavar="COLUMN=MESSAGE.SIGNAL", help="Recorded signal and the signal that carries it."),
+]
+DbcOption = Annotated[Path, typer.Option("--dbc", metavar="FILE", help="DBC file of the network.")]
+LogOption = Annotated[Path, typer.Option("--out", metavar="FILE", help="Log to write, .blf or .asc.")]
+
+
+def export_can(
+    results: ResultsFolder, columns: Columns, dbc: DbcOption, out: LogOption, wheel_radius: Radius = None
+) -> None:
+    """Write results as a log of CAN frames.
+
+    Measurement files and time series read the log like any other recording, with the DBC file beside it.
+    """
+    from yawbench.orchestrator.results.reader import load_results
+
+    from .can_log import write_log
+
+    pairs = dict(text.partition("=")[::2] for text in columns)
+    count = write_log(load_results(results), dbc, pairs, out, wheel_radius=wheel_radius)
+    say(f"{out}: {counted(count, 'frame')}")

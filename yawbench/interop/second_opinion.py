@@ -34,6 +34,7 @@ import json
 import os
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field, replace
@@ -46,12 +47,12 @@ import numpy as np
 
 from yawbench.foundation.errors import WiringError
 from yawbench.foundation.processes import how_it_ended, python
-from yawbench.orchestrator.plan import Instance, Override, Plan
+from yawbench.orchestrator.plan import Override, Plan
 from yawbench.orchestrator.scenario import ssp_read
 from yawbench.orchestrator.scenario.ssp_archive import PARAMETER_SET
 from yawbench.orchestrator.signal_names import SignalName
 
-from .ssp_write import write_ssp
+from .ssp_write import with_numbers, write_ssp
 
 AGREEMENT = 1e-9
 """Difference, relative to a signal's range, up to which two runs agree: rounding, and the fact that one
@@ -209,19 +210,9 @@ def _request(plan: Plan, one_step: bool, folder: Path) -> Request:
     if one_step:
         plan = replace(plan, instances=tuple(replace(instance, period=1) for instance in plan.instances))
     path = folder / ("one_step.ssp" if one_step else "system.ssp")
-    write_ssp(replace(plan, instances=tuple(map(_numbered, plan.instances))), path)
+    with tempfile.TemporaryDirectory(dir=folder) as numbered:
+        write_ssp(with_numbers(plan, Path(numbered)), path)
     return Request(str(path), float(plan.step), plan.n_steps, _columns(plan))
-
-
-def _numbered(instance: Instance) -> Instance:
-    """Return an instance with numbers in place of the names of choices, which libcosim does not read."""
-    fmu = instance.fmu
-    variables = {
-        name: replace(v, type="Integer", items=None, choices=None) if v.items is not None else v
-        for name, v in fmu.variables.items()
-    }
-    values = {name: fmu.variables[name].encoded(value) for name, value in instance.parameters.items()}
-    return replace(instance, fmu=replace(fmu, variables=variables), parameters=values)
 
 
 def _columns(plan: Plan) -> list[tuple[str, str]]:

@@ -23,7 +23,7 @@ import math
 import re
 import unicodedata
 import zipfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from fractions import Fraction
 from importlib.metadata import version
@@ -34,6 +34,7 @@ from lxml import etree
 from lxml.etree import SubElement, _Element
 
 from yawbench.fmus.archive import open_fmu, read_archive
+from yawbench.fmus.description import MODEL_DESCRIPTION
 from yawbench.fmus.fmu import Fmu, Value, Variable
 from yawbench.foundation.errors import ResultsError, WiringError
 from yawbench.foundation.messages import fold, listed
@@ -123,14 +124,60 @@ def as_fmi3(plan: Plan, folder: Path) -> Plan:
     """
     from yawbench.fmus.fmi3_archive import convert
 
+    return _with_fmus(plan, [i.fmu for i in plan.instances if i.fmu.fmi == 2], convert, folder)
+
+
+def _with_fmus(
+    plan: Plan, changing: Iterable[Fmu], convert: Callable[[Path, Path], Path], folder: Path
+) -> Plan:
+    """Return the plan with some FMUs converted into a folder by a function of archive and folder."""
     made: dict[str, Fmu] = {}
-    for fmu in (instance.fmu for instance in plan.instances if instance.fmu.fmi == 2):
+    for fmu in changing:
         if fmu.sha256 not in made:
             place = folder / fmu.sha256[:8]
             place.mkdir()
             made[fmu.sha256] = replace(open_fmu(convert(fmu.path, place)), built=fmu.built)
     instances = (replace(i, fmu=made.get(i.fmu.sha256, i.fmu)) for i in plan.instances)
     return replace(plan, instances=tuple(instances))
+
+
+def with_numbers(plan: Plan, folder: Path) -> Plan:
+    """Return the plan with FMUs that declare Integers for Enumerations, which are written into a folder.
+
+    libcosim ignores Enumerations of FMI 2.0, and OMSimulator does not read their values from an archive. The
+    functions of an FMU are the same for both types.
+    """
+    named = [
+        i.fmu for i in plan.instances if i.fmu.fmi == 2 and any(v.items for v in i.fmu.variables.values())
+    ]
+    numbered = _with_fmus(plan, named, _numbered, folder)
+    instances = []
+    for before, after in zip(plan.instances, numbered.instances, strict=True):
+        of = before.fmu.variables
+        parameters, constants = (
+            {name: of[name].encoded(value) for name, value in values.items()}
+            for values in (before.parameters, before.constants)
+        )
+        instances.append(replace(after, parameters=parameters, constants=constants))
+    return replace(plan, instances=tuple(instances))
+
+
+def _numbered(path: Path, folder: Path) -> Path:
+    """Write an FMU with Integers in place of Enumerations into a folder; return its path."""
+    made = folder / path.name
+    with zipfile.ZipFile(io.BytesIO(read_archive(path))) as given, zipfile.ZipFile(made, "w") as archive:
+        for info in given.infolist():
+            content = given.read(info)
+            if info.filename == MODEL_DESCRIPTION:
+                root = etree.fromstring(content)
+                for element in root.iterfind("ModelVariables/ScalarVariable/Enumeration"):
+                    element.tag = "Integer"
+                    element.attrib.pop("declaredType", None)
+                    for own in element.getparent().iterfind("Annotations/Tool/variable"):
+                        own.attrib.pop("choices", None)
+                content = etree.tostring(root, xml_declaration=True, encoding="UTF-8")
+            archive.writestr(info, content)
+    return made
 
 
 def _lost(plan: Plan) -> list[str]:
