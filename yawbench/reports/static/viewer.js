@@ -72,10 +72,13 @@ class InAddress {
   implied() { return {}; }
 }
 
+// Further parts of every viewer, from other files: functions of the viewer, called when its panels are drawn.
+const viewerParts = [];
+
 class Viewer extends InAddress {
   constructor(root, data, runs) {
     super();
-    Object.assign(this, {root, data, runs});
+    Object.assign(this, {root, data, runs, listeners: new Set(), density: undefined});
     this.find = (name) => root.querySelector('.yv-' + name);
     this.key = root.id;
     this.fill();
@@ -109,8 +112,9 @@ class Viewer extends InAddress {
     if (this.runs.some((run) => run.road)) {
       this.road = new Road(this);
       this.road.arrange();
-      this.road.draw();
+      this.subscribe(() => this.road.draw(this.density));
     }
+    for (const part of viewerParts) part(this);
     this.root.classList.add('yv-ready');
   }
 
@@ -121,6 +125,19 @@ class Viewer extends InAddress {
     if (this.road) this.road.pause();
     this.removal.abort();
     this.observer.disconnect();
+  }
+
+  // Call `listener`, now and whenever any of it changes, with {time, shown, colours}: the cursor's time in s, the shown
+  // runs (`Run`, in the order of the table), and the colour of each. Return a function that ends it.
+  subscribe(listener) {
+    this.listeners.add(listener);
+    listener(this.news);
+    return () => this.listeners.delete(listener);
+  }
+
+  get news() {
+    const shown = this.runs.filter((run) => this.shows(run));
+    return {time: this.state.time, shown, colours: shown.map((run) => this.colour(run))};
   }
 
   // What depends on the runs: their table, the views and signals to choose from, the legend.
@@ -406,9 +423,14 @@ class Viewer extends InAddress {
     const slider = this.find('slider');
     slider.value = this.state.time;
     slider.setAttribute('aria-valuetext', words);
-    if (this.road) this.road.draw();
+    this.tell();
     clearTimeout(this.later);
     this.later = setTimeout(() => this.remember(), 200);
+  }
+
+  tell() {
+    const {news} = this;
+    for (const listener of this.listeners) listener(news);
   }
 
   get step() {
@@ -457,13 +479,13 @@ class Viewer extends InAddress {
 
   resized() {
     if (this.root.classList.contains('yv-print')) return;
-    if (this.root.clientWidth !== this.wide) this.redraw(); else if (this.road) this.road.draw();
+    if (this.root.clientWidth !== this.wide) this.redraw(); else this.tell();
   }
 
   print(printing = true) {
     this.root.classList.toggle('yv-print', printing);
-    this.refresh(printing ? PAPER : undefined);
-    if (this.road && printing) this.road.draw(PAPER);
+    this.density = printing ? PAPER : undefined;
+    this.refresh(this.density);
   }
 
   drawTable() {
