@@ -22,7 +22,7 @@ from yawbench.orchestrator.scenario.overrides import changed
 from yawbench.proving_ground.sine_with_dwell import RATIOS, SPUN, course_of
 from yawbench.proving_ground.trace import trace_of
 from yawbench.reports.page_parts import FigureImage, Page, Part, anchor, image_of, option_of, render
-from yawbench.reports.viewer import DATA, Settings, View, assets, carried, embedded, tidy_sides, write_side
+from yawbench.reports.viewer import DATA, Bound, Mark, Settings, View, assets, carried, embedded, tidy_sides, write_side
 from yawbench.studies.experiment import FIGURES
 from yawbench.studies.experiment_result import Each
 from yawbench.studies.jobs import STEP_TIME
@@ -336,21 +336,20 @@ def _write_side(key: str, label: str, results: Path | None, html: str, folder: P
     if results is not None:
         with suppress(ResultsError):
             run = load_results(results)
-            limits = [("sideslip", side * SPUN, "20° of sideslip") for side in (1.0, -1.0)]
-            settings = Settings(
-                [View(panels=SHOWN)], marks=_instants(run), limits=limits, dashed_of=0, largest=1
-            )
+            limits = [Bound("sideslip", side * SPUN, "20° of sideslip", 0) for side in (1.0, -1.0)]
+            settings = Settings([View(panels=SHOWN)], marks=_instants(run), limits=limits, largest=1)
             content = carried([LabelledRun(label, run)], settings)
     write_side(folder, key, content, html=html)
 
 
-def _instants(run: Results) -> list[tuple[float, str]]:
+def _instants(run: Results) -> list[Mark]:
     """Return the instants of the test: completion of steer, and those at which the yaw rate is judged."""
     try:
         course = course_of(trace_of(run, SERIES))
     except (NotJudged, ResultsError):
         return []
-    return [(course.end, "COS"), *((course.end + late, f"COS + {late:g} s") for late, _ in RATIOS)]
+    instants = [(0.0, "COS"), *((late, f"COS + {late:g} s") for late, _ in RATIOS)]
+    return [Mark(course.end + late, text, 0) for late, text in instants]
 
 
 def _text(number: float | None, unit: str) -> str | None:

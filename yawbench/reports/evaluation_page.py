@@ -28,7 +28,7 @@ from yawbench.studies.tables import Table
 from yawbench.vocabulary.signals import SIGNALS
 
 from .page_parts import Document, render
-from .viewer import LARGEST, MOST, Settings, View, assets, viewer
+from .viewer import LARGEST, MOST, Bound, Mark, Settings, View, assets, viewer
 
 PANELS = ("steering_wheel_angle", "yaw_rate", "sideslip", "acceleration_y", "cone_overrun")
 """Signals shown first, where they are recorded; chosen: what most tests judge."""
@@ -87,22 +87,25 @@ def evaluation_page(
     labels = [trace.label for trace in traces]
     deciding = [labels.index(label) for label in decide] or [0]
     chosen = judged[deciding[0]]
-    marks, limits = test.marks(chosen)
+    dashed = [test.marks(run) for run in judged[:MOST]]
+    marks = [Mark(*mark, number) for number, (own, _) in enumerate(dashed) for mark in own]
+    limits = [Bound(*limit, number) for number, (_, own) in enumerate(dashed) for limit in own]
     shown_first = sorted(set(deciding))[:MOST]
     views = [View("the runs that decide", PANELS, shown_first)]
     if len(traces) > len(shown_first):
         views.append(View("all runs", PANELS))
     every = [runs_table(series.runs if series else judged, test, series)] if len(judged) > 1 else []
     runs = [LabelledRun(label, results_of(trace)) for label, trace in zip(labels, traces, strict=True)][:MOST]
-    settings = Settings(views, marks=marks, limits=limits, dashed_of=deciding[0], largest=LARGEST)
-    dashed = [*(f"{instant:.3f} s: {text}" for instant, text in marks), *map(_limit_words, limits)]
+    settings = Settings(views, marks=marks, limits=limits, largest=LARGEST)
+    instants, bounds = dashed[deciding[0]]
+    told = [*(f"{instant:.3f} s: {text}" for instant, text in instants), *map(_limit_words, bounds)]
     view = Document(
         title=f"{test.name.replace('-', ' ').capitalize()}: {counted(len(judged), 'run')}",
         below=f"{test.says[:1].upper()}{test.says[1:]}.",
         sentence=series.summary if series else _sentence(criteria, judged),
         first=[criteria] if criteria.rows else [],
         viewer=viewer(runs, settings, name="test", alone=True),
-        notes=[f"Dashed, of {chosen.label}: {'; '.join(dashed)}."] if dashed else [],
+        notes=[f"Dashed, of {chosen.label}: {'; '.join(told)}."] if told else [],
         sections=[
             *([("All runs", every)] if every else []),
             ("Quantities", [run_table(run, test.says) for run in judged]),

@@ -33,7 +33,7 @@ from yawbench.studies.jobs import NOT_MADE, Job
 from yawbench.studies.limits import Limit, limits_of
 
 from .page_parts import Part, option_of, render
-from .viewer import DATA, METRICS, PANELS, Settings, View, carried, embedded, tidy_sides, write_side
+from .viewer import DATA, METRICS, PANELS, Bound, Settings, View, carried, embedded, tidy_sides, write_side
 
 SWEEP_ASSETS = ("sweep.js", "sweep.css")
 """Script and style sheet of the view."""
@@ -312,7 +312,7 @@ def side_settings(findings: ExperimentResult) -> Settings:
         bounded = metrics[key]
         if bounded.name.startswith("peak(") and not bounded.other:
             level = limit["bound"] / shown_unit(findings.unit(key))[1]
-            limits += [(bounded.signal, side * level, "limit") for side in (1.0, -1.0)]
+            limits += [Bound(bounded.signal, side * level, "limit") for side in (1.0, -1.0)]
     names = [spec.metric for spec in findings.spec.metrics.values()][:MOST_METRICS] or METRICS
     return Settings([View(panels=panels)], names, limits=limits, largest=1)
 

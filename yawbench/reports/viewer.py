@@ -17,6 +17,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from markupsafe import Markup
 
+from yawbench.events.kinds import events_in
+from yawbench.events.why import Reason, far_of, label_of, lost_among
 from yawbench.figures.display import LabelledRun, digits_apart, shown, shown_unit, unit_of_signal
 from yawbench.figures.plots import changes_of, spans_of
 from yawbench.figures.style import LINES, MEASURED_LINE, line_style
@@ -24,7 +26,7 @@ from yawbench.foundation.errors import ResultsError
 from yawbench.foundation.messages import listed
 from yawbench.foundation.safe_files import write_whole
 from yawbench.measurements.measured_results import MeasuredResults
-from yawbench.metrics.expressions import MetricValue, columns_of, evaluate, metric, reference_of, while_moving
+from yawbench.metrics.expressions import Metric, MetricValue, columns_of, evaluate, metric, reference_of, while_moving
 from yawbench.metrics.measures import words
 from yawbench.orchestrator.results.reader import Results
 from yawbench.orchestrator.results.run_record import RunStatus
@@ -35,8 +37,8 @@ from .road import legend_of, notes_of, road_of, without_tyres
 from .viewer_data import PackedRun, is_numeric, pack
 
 SCRIPTS = (
-    "viewer_data.js", "viewer_panels.js", "viewer_draw.js", "viewer_scene.js", "viewer_close_up.js",
-    "viewer_road.js", "viewer.js", "viewer_side.js",
+    "viewer_data.js", "viewer_panels.js", "viewer_draw.js", "viewer_picture.js", "viewer_events.js",
+    "viewer_scene.js", "viewer_close_up.js", "viewer_road.js", "viewer.js", "viewer_side.js",
 )  # fmt: skip
 SHEETS = ("uPlot.min.css", "viewer.css")
 MOST = 200
@@ -74,6 +76,34 @@ class View:
     x: str = "time"
 
 
+class Mark(NamedTuple):
+    """An instant [s] with its text, as a vertical line; `run`: number of the run that it belongs to, or all."""
+
+    time: float
+    text: str
+    run: int | None = None
+
+
+class Bound(NamedTuple):
+    """A bound of a signal in SI units with its text, as a horizontal line; `run`: as of a `Mark`."""
+
+    signal: str
+    value: float
+    text: str
+    run: int | None = None
+
+
+class Curve(NamedTuple):
+    """A curve in the plane of two signals, in their SI units, with its text; `run`: as of a `Mark`."""
+
+    x: str
+    y: str
+    text: str
+    xs: Sequence[float]
+    ys: Sequence[float]
+    run: int | None = None
+
+
 @dataclass(frozen=True)
 class Settings:
     """Settings of a viewer.
@@ -81,9 +111,7 @@ class Settings:
     Attributes:
         views: to choose from; the first is shown at first.
         metrics: those in the table of runs.
-        marks: instants [s] with a text, as vertical lines.
-        limits: signal, bound in SI units and a text, as horizontal lines.
-        dashed_of: number of the run that marks and limits belong to, with which they are hidden; None: all.
+        marks, limits, curves: dashed lines; those of a run are hidden with it.
         largest: size of the samples [bytes]; beyond it, the page carries the signals of the views and of the
             road alone, and still beyond it, of the road without the forces of the tyres. 0: no limit.
         ghosts: numbers of runs that are drawn faintly behind the others.
@@ -92,9 +120,9 @@ class Settings:
 
     views: Sequence[View] = (View(),)
     metrics: Sequence[str] = METRICS
-    marks: Sequence[tuple[float, str]] = ()
-    limits: Sequence[tuple[str, float, str]] = ()
-    dashed_of: int | None = None
+    marks: Sequence[Mark] = ()
+    limits: Sequence[Bound] = ()
+    curves: Sequence[Curve] = ()
     largest: int = 0
     ghosts: Sequence[int] = ()
     bands: Sequence[int] = ()
@@ -208,12 +236,20 @@ def carried(
         "grounds": grounds,
         "still": still_of(results),
         "limits": [
-            [column, bound, text]
-            for signal, bound, text in settings.limits
+            [column, bound, text, run]
+            for signal, bound, text, run in settings.limits
             for column in _columns(results, signal)
         ],
         "marks": [list(mark) for mark in settings.marks],
-        "dashed_of": settings.dashed_of,
+        "curves": [
+            [x, y, text, [*xs], [*ys], run]
+            for x_name, y_name, text, xs, ys, run in settings.curves
+            for x, y in zip(_columns(results, x_name), _columns(results, y_name), strict=False)
+        ],
+        "why": [
+            [number, [_sentence(reason, number, best) for reason in reasons], best]
+            for number, reasons, best in lost_among([*map(events_in, results)])
+        ],
         "signals": {name: signal for name, signal in _signals(results).items() if name in carried},
         "dashes": [_dash(number) for number in range(len(LINES))],
         "metrics": [
@@ -226,6 +262,8 @@ def carried(
                 "label": run.label,
                 "faults": [[span.begin, span.end, span.label] for span in spans_of([run])],
                 "notes": notes[number],
+                "events": _events(run.results),
+                "folder": str(run.results.folder) if run.results.folder != Path() else "",
                 "road": road,
                 "ghost": number in settings.ghosts,
                 "band": number in settings.bands,
@@ -236,6 +274,22 @@ def carried(
         ],
     }
     return Carried(data, packed)
+
+
+def _sentence(reason: Reason, run: int, best: int | None) -> list[Any]:
+    """Return a reason's sentence, its instant, and the number of the run in which it can be seen."""
+    return [str(reason), reason.event and reason.event.time, best if reason.beside else run]
+
+
+def _events(run: Results) -> list[dict[str, Any]]:
+    """Return the events of a run as the viewer lists them; those that several columns tell alike, once."""
+    found: dict[tuple[float, str], dict[str, Any]] = {}
+    for event in events_in(run):
+        label = label_of(event)
+        unit = unit_of_signal(run.units.get(event.signal, "")) if event.unit == "SI" else event.unit
+        listed = {"time": event.time, "until": event.until, "label": label, "far": far_of(event, unit)}
+        found.setdefault((event.time, label), listed | {"signal": event.signal})
+    return [*found.values()]
 
 
 def _sizes(packed: Sequence[PackedRun]) -> Iterator[int]:
@@ -377,8 +431,25 @@ def _signals(results: Sequence[Results]) -> dict[str, dict[str, Any]]:
 
 def _values(runs: Sequence[LabelledRun], name: str) -> list[str]:
     """Return a metric of every run as text, "" where a run has none."""
-    values = [evaluate(run.results, metric(name)) for run in runs]
-    return [shown(value.number, value.shown_in) if value is not None else "" for value in values]
+    wanted = metric(name)
+    values = [(run.results, evaluate(run.results, wanted)) for run in runs]
+    return [
+        shown(value.number, value.shown_in) + (", still growing" if _grows(run, wanted) else "")
+        if value is not None
+        else ""
+        for run, value in values
+    ]
+
+
+def _grows(run: Results, wanted: Metric) -> bool:
+    """Return whether a peak is that of the last sample: it would have become larger."""
+    columns = columns_of(run, wanted.signal) if wanted.name.startswith("peak(") and not wanted.other else ()
+    if wanted.window:
+        return False
+    for column in columns[:1]:
+        size = np.abs(while_moving(run).columns[column])
+        return bool(size.size > 1 and size[-1] > np.max(size[:-1]))
+    return False
 
 
 def still_of(results: Sequence[Results]) -> float:

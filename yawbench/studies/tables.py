@@ -12,7 +12,7 @@ from itertools import chain, zip_longest
 from typing import TYPE_CHECKING, Any, Literal
 
 from yawbench.events.kinds import events_in
-from yawbench.events.why import furthest_aside, lost, why
+from yawbench.events.why import lost_among
 from yawbench.figures.display import shown
 from yawbench.foundation.errors import text_of
 from yawbench.foundation.messages import printable
@@ -405,20 +405,18 @@ def marked(label: str, results: Results) -> str:
 
 
 def remarks(runs: Iterable[tuple[str, Results]]) -> list[str]:
-    """Return a note for each marked run of (label, results), and why a car was lost.
-
-    Where several runs are compared, with the one that turned aside least beside.
-    """
+    """Return a note for each marked run of (label, results), and why a car was lost."""
     shown = [*runs]
     notes = [f"{MARK} {label}: {says}" for label, results in shown if (says := _remarkable(results))]
-    events = [events_in(results) for _, results in shown]
-    best = (
-        min((e for e in events if not lost(e)), key=furthest_aside, default=None) if len(shown) > 1 else None
-    )
-    for (label, _), own in zip(shown, events, strict=True):
-        if reasons := why(own, best):
-            notes.append(f"{label}: lost because {'; '.join(map(str, reasons))}")
-    return notes
+    return [*notes, *lost_notes(shown)]
+
+
+def lost_notes(runs: Sequence[tuple[str, Results]]) -> list[str]:
+    """Return why a car was lost, of runs as (label, results), with the run that did best beside."""
+    return [
+        f"{runs[number][0]}: lost because {'; '.join(map(str, reasons))}"
+        for number, reasons, _ in lost_among([events_in(results) for _, results in runs])
+    ]
 
 
 def _remarkable(results: Results) -> str:
