@@ -244,12 +244,15 @@ class Lost(NamedTuple):
     best: int | None
 
 
-def lost_among(runs: Sequence[Sequence[EventRecord]]) -> list[Lost]:
+def lost_among(runs: Sequence[Sequence[EventRecord]], *, comparable: bool = True) -> list[Lost]:
     """Return the runs, of several given by their events, whose cars were lost, and why.
 
-    Where several are compared, with the one that turned aside least beside.
+    Args:
+        runs: their events.
+        comparable: whether they are runs under the same conditions; then the one that turned aside least of
+            those that were not lost stands beside.
     """
-    held = [number for number, events in enumerate(runs) if not lost(events)]
+    held = [number for number, events in enumerate(runs) if comparable and not lost(events)]
     best = min(held, key=lambda number: furthest_aside(runs[number]), default=None)
     found = (
         Lost(number, why(events, None if best is None else runs[best]), best)

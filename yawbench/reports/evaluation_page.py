@@ -14,12 +14,14 @@ from pathlib import Path
 
 import numpy as np
 
+from yawbench.events.kinds import events_in
 from yawbench.figures.display import LabelledRun, digits_apart, shown
 from yawbench.foundation.messages import counted
 from yawbench.metrics.measures import words
 from yawbench.metrics.verdict import SYMBOLS, Status, Verdict, worded, worst
 from yawbench.orchestrator.results.reader import Results, load_results
-from yawbench.orchestrator.results.run_record import RunRecord
+from yawbench.orchestrator.results.run_folder import load_record
+from yawbench.orchestrator.results.run_record import EventRecord, RunRecord
 from yawbench.proving_ground.standard_tests import Evaluation, Limit, StandardTest, TestSeries
 from yawbench.proving_ground.trace import Trace
 from yawbench.studies.driven_tests import run_table, runs_table
@@ -96,7 +98,7 @@ def evaluation_page(
         views.append(View("all runs", PANELS))
     every = [runs_table(series.runs if series else judged, test, series)] if len(judged) > 1 else []
     runs = [LabelledRun(label, results_of(trace)) for label, trace in zip(labels, traces, strict=True)][:MOST]
-    settings = Settings(views, marks=marks, limits=limits, largest=LARGEST)
+    settings = Settings(views, marks=marks, limits=limits, largest=LARGEST, comparable=series is None)
     instants, bounds = dashed[deciding[0]]
     told = [*(f"{instant:.3f} s: {text}" for instant, text in instants), *map(_limit_words, bounds)]
     view = Document(
@@ -136,6 +138,13 @@ def results_of(trace: Trace) -> Results:
     if trace.folder is not None:
         return load_results(trace.folder)
     return drawn(Results, trace.time, trace.signals)
+
+
+def events_of_trace(trace: Trace) -> Sequence[EventRecord]:
+    """Return the events of a trace: those of its record, for which no signals are read, else found."""
+    if trace.folder is not None and "events" in (record := load_record(trace.folder)).model_fields_set:
+        return record.events
+    return events_in(results_of(trace))
 
 
 def drawn(kind: type[Results], time: np.ndarray, columns: Mapping[str, np.ndarray]) -> Results:

@@ -5,21 +5,24 @@ It has the verdicts, runs, system, tables and parameters of the experiment, and 
 
 from __future__ import annotations
 
+import json
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
+from urllib.parse import quote
 
 from markupsafe import Markup
 
-from yawbench.figures.display import LabelledRun
+from yawbench.figures.display import LabelledRun, shown
 from yawbench.figures.phase_portrait import signals_of
 from yawbench.foundation.errors import ResultsError
 from yawbench.foundation.messages import counted, listed
 from yawbench.measurements.measured_results import filtered_alike
-from yawbench.metrics.expressions import evaluate, metric
+from yawbench.metrics.expressions import columns_of, evaluate, metric, reference_of
+from yawbench.metrics.verdict import SYMBOLS
 from yawbench.orchestrator.plan import Plan
 from yawbench.orchestrator.results.reader import Results
 from yawbench.orchestrator.results.record_of_plan import run_record
@@ -28,9 +31,9 @@ from yawbench.orchestrator.results.run_record import RunRecord, RunStatus
 from yawbench.orchestrator.scenario.loader import LoadedScenario
 from yawbench.orchestrator.scenario.overrides import changed
 from yawbench.planner import Planner
-from yawbench.studies.claims import ClaimResult
+from yawbench.studies.claims import ClaimResult, Comparison
 from yawbench.studies.confidence import CONFIDENCE
-from yawbench.studies.experiment import FIGURES, LoadedExperiment
+from yawbench.studies.experiment import FIGURES
 from yawbench.studies.experiment_result import Each, ExperimentResult
 from yawbench.studies.jobs import Job
 from yawbench.studies.open_value_regions import runs_of as runs_of_claim
@@ -204,8 +207,8 @@ def chapter(
         counts=counts_of(findings.claims),
         reach=reach(findings),
         answer=" ".join(filter(None, (answer(findings), sweep and sweep_sentence(findings)))),
-        claims=[judged(result, link_to_runs(experiment, result, numbers)) for result in findings.claims],
-        checks=[judged(result, link_to_runs(experiment, result, numbers)) for result in findings.checks],
+        claims=[judged(result, link_to_runs(findings, result, numbers)) for result in findings.claims],
+        checks=[judged(result, link_to_runs(findings, result, numbers)) for result in findings.checks],
         region=region_table(findings) if findings.regions else None,
         limits=limit_tables(findings),
         systems=systems(plans, spec.title),
@@ -234,16 +237,55 @@ def chapter(
     )
 
 
-def link_to_runs(experiment: LoadedExperiment, result: ClaimResult, numbers: Mapping[str, int]) -> str:
+def link_to_runs(findings: ExperimentResult, result: ClaimResult, numbers: Mapping[str, int]) -> str:
     """Return the state of the viewer that shows a claim's runs; "" if it has none of them.
 
+    The run that decides is the baseline; the signal that decides is highlighted, with its bound if that is one
+    of the signal's values.
+
     Args:
-        experiment: of the claim.
+        findings: the experiment and its results.
         result: the judged claim.
         numbers: run -> its number in the viewer.
     """
-    shown = [numbers[run] for run in runs_of_claim(experiment, result.claim) if run in numbers]
-    return f"{VIEW}?shown={shown}&baseline={shown[0]}".replace(" ", "") if shown else ""
+    runs = [numbers[run] for run in runs_of_claim(findings.experiment, result.claim) if run in numbers]
+    if not runs:
+        return ""
+    first, lit = runs[0], ""
+    judged = [
+        (verdict.margin, comparison, one.run)
+        for comparison in result.compared
+        for verdict, one in zip(comparison.verdicts, comparison.measured, strict=False)
+        if verdict.margin is not None and one.run in numbers
+    ]
+    if judged:
+        _, comparison, run = min(judged, key=lambda item: item[0])
+        first = numbers[run]
+        if highlighted := _highlighted(findings, comparison, findings.results[run]):
+            lit = f"&lit={quote(json.dumps(highlighted, ensure_ascii=False, separators=(',', ':')))}"
+    return f"{VIEW}?shown={runs}&baseline={first}".replace(" ", "") + lit
+
+
+def _highlighted(findings: ExperimentResult, comparison: Comparison, run: Results) -> list[Any] | None:
+    """Return the signal of a condition's metric, as a panel names it, its bound on it or None, and a text."""
+    spec = findings.spec.metrics.get(comparison.condition.metric)
+    chosen = metric(spec.metric) if spec else None
+    columns = columns_of(run, chosen.signal) if chosen else []
+    if chosen is None or not columns or comparison.bound is None:
+        return None
+    signal, bound = columns[0], comparison.bound
+    if chosen.other or chosen.measure.needs_reference:
+        others = columns_of(run, chosen.other) if chosen.other else [reference_of(run, signal) or ""]
+        if not others or not others[0]:
+            return None
+        signal = f"{signal} - {others[0]}"
+    relation = comparison.condition.relation
+    text = f"{chosen.title} {SYMBOLS[relation]} {shown(bound, comparison.unit)}"
+    return [signal, bound if chosen.name.partition("(")[0] in ON_SIGNAL else None, text]
+
+
+ON_SIGNAL = ("peak", "peak_error", "final", "value")
+"""Measures whose value is one of their signal."""
 
 
 def runs_made(findings: ExperimentResult) -> Sequence[tuple[Results | Plan, int]]:

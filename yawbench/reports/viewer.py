@@ -116,6 +116,8 @@ class Settings:
             road alone, and still beyond it, of the road without the forces of the tyres. 0: no limit.
         ghosts: numbers of runs that are drawn faintly behind the others.
         bands: numbers of runs whose closed line is filled, behind all others; not over time.
+        comparable: whether the runs are under the same conditions, so that the best of them stands beside one
+            that was lost.
     """
 
     views: Sequence[View] = (View(),)
@@ -126,6 +128,7 @@ class Settings:
     largest: int = 0
     ghosts: Sequence[int] = ()
     bands: Sequence[int] = ()
+    comparable: bool = True
 
 
 SETTINGS = Settings()
@@ -247,8 +250,10 @@ def carried(
             for x, y in zip(_columns(results, x_name), _columns(results, y_name), strict=False)
         ],
         "why": [
-            [number, [_sentence(reason, number, best) for reason in reasons], best]
-            for number, reasons, best in lost_among([*map(events_in, results)])
+            [number, [_sentence(reason, number, best, reasons[-1]) for reason in reasons], best]
+            for number, reasons, best in lost_among(
+                [*map(events_in, results)], comparable=settings.comparable
+            )
         ],
         "signals": {name: signal for name, signal in _signals(results).items() if name in carried},
         "dashes": [_dash(number) for number in range(len(LINES))],
@@ -276,9 +281,10 @@ def carried(
     return Carried(data, packed)
 
 
-def _sentence(reason: Reason, run: int, best: int | None) -> list[Any]:
-    """Return a reason's sentence, its instant, and the number of the run in which it can be seen."""
-    return [str(reason), reason.event and reason.event.time, best if reason.beside else run]
+def _sentence(reason: Reason, run: int, best: int | None, loss: Reason) -> list[Any]:
+    """Return a reason's sentence, its instant, else that of the loss, and the run in which it can be seen."""
+    event = reason.event or loss.event
+    return [str(reason), event and event.time, best if reason.beside else run]
 
 
 def _events(run: Results) -> list[dict[str, Any]]:

@@ -21,6 +21,7 @@ from yawbench.metrics.expressions import (
 )
 from yawbench.metrics.verdict import VerdictText
 from yawbench.orchestrator.results.reader import Results
+from yawbench.orchestrator.results.run_record import EventRecord
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -408,15 +409,21 @@ def remarks(runs: Iterable[tuple[str, Results]]) -> list[str]:
     """Return a note for each marked run of (label, results), and why a car was lost."""
     shown = [*runs]
     notes = [f"{MARK} {label}: {says}" for label, results in shown if (says := _remarkable(results))]
-    return [*notes, *lost_notes(shown)]
+    return [*notes, *lost_notes([(label, events_in(results)) for label, results in shown])]
 
 
-def lost_notes(runs: Sequence[tuple[str, Results]]) -> list[str]:
-    """Return why a car was lost, of runs as (label, results), with the run that did best beside."""
-    return [
-        f"{runs[number][0]}: lost because {'; '.join(map(str, reasons))}"
-        for number, reasons, _ in lost_among([events_in(results) for _, results in runs])
-    ]
+def lost_notes(
+    runs: Sequence[tuple[str, Sequence[EventRecord]]], most: int | None = None, *, comparable: bool = True
+) -> list[str]:
+    """Return why cars were lost, of runs as (label, events); `comparable`: see `lost_among`.
+
+    Of more than `most`, the first have notes, and a last note says how many more there are.
+    """
+    found = lost_among([events for _, events in runs], comparable=comparable)
+    notes = [f"{runs[number][0]}: lost because {'; '.join(map(str, reasons))}" for number, reasons, _ in found]
+    if most is None or len(notes) <= most:
+        return notes
+    return [*notes[:most], f"{len(notes) - most} more runs were lost; the page says why"]
 
 
 def _remarkable(results: Results) -> str:

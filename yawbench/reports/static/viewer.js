@@ -188,7 +188,12 @@ class Viewer extends InAddress {
         offset.setAttribute('aria-labelledby', `${key}-run-${k} ${key}-offset`);
         row.append(run.dash ? made('td', offset) : made('td'));
       }
-      for (const [, values] of data.metrics) row.append(made('td', values[k] || '–', {className: 'yv-metric'}));
+      for (const [, values] of data.metrics) {
+        const [value, remark] = (values[k] || '–').split(', ');
+        const cell = made('td', value, {className: 'yv-metric'});
+        if (remark) cell.append(made('small', remark));
+        row.append(cell);
+      }
       return row;
     };
     find('rest').hidden = data.runs.length <= FEW;
@@ -236,7 +241,7 @@ class Viewer extends InAddress {
       span: (v) => v === null || isSpan(v),
       heights: (v) => isRecord(v) && Object.values(v).every(isSpan), tall: (v) => Array.isArray(v) && v.every((one) => typeof one === 'string'),
       pin: (v) => v === null || Number.isFinite(v),
-      lit: (v) => v === null || (Array.isArray(v) && v.length === 3 && v[0] in this.data.signals && (v[1] === null || Number.isFinite(v[1])) && typeof v[2] === 'string'),
+      lit: (v) => v === null || (Array.isArray(v) && v.length === 3 && typeof v[0] === 'string' && this.known(v[0]) && (v[1] === null || Number.isFinite(v[1])) && typeof v[2] === 'string'),
       time: Number.isFinite, difference: (v) => typeof v === 'boolean', tolerance: (v) => Number.isFinite(v) && v >= 0,
       x: (v) => this.axes().includes(v), camera: (v) => v === 'cars' || v === 'whole' || isRun(v),
       near: (v) => v >= ZOOM[0] && v <= ZOOM[1],
@@ -246,9 +251,22 @@ class Viewer extends InAddress {
 
   implied(name, value) {
     if (name === 'view') return this.viewed(value);
-    if (name !== 'lit' || !value) return {};
-    const panels = this.initial().panels; // a claim's signal has a panel
-    return panels.some((spec) => spec.split(',').includes(value[0])) ? {} : {panels: [value[0], ...panels]};
+    return {};
+  }
+
+  // What a claim judges (`lit`: its signal, its bound, its words) has the first panel; the cursor goes to its peak.
+  restore() {
+    if (!super.restore()) return false;
+    const {lit} = this.state;
+    if (!lit || readAddress(this.key)?.has('time')) return true;
+    const own = this.state.panels.find((spec) => spec.split(',').includes(lit[0])) ?? lit[0];
+    this.state.panels = [own, ...this.state.panels.filter((spec) => spec !== own)];
+    const run = this.lead();
+    if (run.has(lit[0])) {
+      const size = run.column(lit[0]).map((value) => (Number.isFinite(value) ? Math.abs(value) : 0));
+      this.state.time = run.time[size.indexOf(extremes(size)[1])] + this.offset(run.number);
+    }
+    return true;
   }
 
   // ---- runs ----

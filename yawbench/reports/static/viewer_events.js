@@ -6,8 +6,8 @@ class Events {
   constructor(viewer) {
     const [why, list, rest, count] = ['why', 'events', 'events-rest', 'events-count'].map((name) => viewer.find(name));
     Object.assign(this, {viewer, why, list, rest, count, all: false, key: ''});
-    why.hidden = !viewer.data.why.length;
-    why.append(...viewer.data.why.map((reasons) => this.sentences(reasons)));
+    this.lines = viewer.data.why.map((reasons) => [viewer.runs[reasons[0]], this.sentences(reasons)]);
+    why.append(...this.lines.map(([, line]) => line));
     list.closest('details').hidden = !viewer.runs.some((run) => run.events.length);
     rest.addEventListener('click', () => { this.all = true; this.key = ''; this.fill(); });
     viewer.subscribe(() => this.fill());
@@ -39,12 +39,14 @@ class Events {
     return link;
   }
 
-  // List the events of the shown runs, if these have changed.
+  // List the events of the shown runs, and why these were lost, if they have changed.
   fill() {
     const {viewer} = this;
     const key = JSON.stringify([viewer.state.shown, viewer.state.offsets, viewer.theme.ink]);
     if (key === this.key) return;
     this.key = key;
+    for (const [run, line] of this.lines) line.hidden = !viewer.shows(run);
+    this.why.hidden = this.lines.every(([, line]) => line.hidden);
     const found = viewer.runs.filter((run) => viewer.shows(run)).flatMap((run) => run.events.map((event) => ({run, ...event})))
       .sort((one, other) => one.time - other.time);
     this.count.textContent = found.length;

@@ -161,7 +161,8 @@ class Panel {
       tool('✕', 'Remove', () => viewer.removePanel(this.spec)),
     );
     const lit = viewer.state.lit;
-    root.classList.toggle('yv-lit', Boolean(lit && this.signals.includes(lit[0])));
+    this.lit = lit && this.signals.includes(lit[0]) ? lit : null;
+    root.classList.toggle('yv-lit', Boolean(this.lit));
     Object.assign(this, {
       root, chart: root.querySelector('.yv-chart'), table: root.querySelector('table'),
       body: root.querySelector('tbody'), sentence: root.querySelector('p'), remark: root.querySelector('output'),
@@ -250,7 +251,7 @@ class Panel {
     range = extremes(this.limits().map(([bound]) => bound * factor), range);
     if (!(range[0] <= range[1])) return [-1, 1];
     const room = 0.07 * (range[1] - range[0]) || Math.abs(range[0]) * 0.1 || 1;
-    return [range[0] - room, range[1] + room];
+    return [range[0] - room, range[1] + (this.marks().some(({text: says}) => says) ? 3 : 1) * room]; // above: their words
   }
 
   // The limits of the panel's signals that shown runs have, in SI, each with its text; last that of a claim.
@@ -258,7 +259,7 @@ class Panel {
     const {data, state} = this.viewer;
     if (state.difference) return [];
     const own = data.limits.filter(([name, , , run]) => this.signals.includes(name) && this.viewer.tells(run));
-    const lit = state.lit && this.signals.includes(state.lit[0]) && state.lit[1] !== null ? [[state.lit[1], state.lit[2], true]] : [];
+    const lit = this.lit && this.lit[1] !== null ? [[this.lit[1], '', true], [-this.lit[1], '', true]] : [];
     return [...own.map(([, bound, text]) => [bound, text]), ...lit];
   }
 
@@ -316,7 +317,7 @@ class Panel {
       if (says && at >= 0) text(c, says, px[at] + 5 * ratio, py[at], words);
     }
     c.restore();
-    const rows = Array.from({length: Math.max(1, Math.floor(height / ratio / 40))}, () => -Infinity); // ends of the words in each
+    const rows = Array.from({length: Math.max(1, Math.floor(height / ratio / 32))}, () => -Infinity); // ends of the words in each
     c.font = `${words.size}px system-ui, sans-serif`;
     for (const {time, text: says, colour, short} of this.marks()) {
       const x = toX(time);
@@ -536,7 +537,7 @@ class Panel {
 
   tellTolerance() {
     const tolerance = this.tolerance();
-    this.remark.textContent = '';
+    this.remark.textContent = this.lit ? `judged: ${this.lit[2]}` : '';
     if (!(tolerance > 0)) return;
     const found = this.shown.map(({run, values}) => {
       const first = values.findIndex((value) => Math.abs(value) > tolerance);
