@@ -712,8 +712,7 @@ def test_runs_of_other_steps_lengths_and_signals_and_failed_ones_share_a_page(ch
     assert "ends at 4.00 s" in captions[2]
     assert mentions(captions[3], "0.30 s", "failed")
     values = chromium.run(
-        VIEWER
-        + "viewer.seek(7); viewer.moveCursor(); const {cells, shown} = viewer.panels[1];"
+        VIEWER + "viewer.seek(7); viewer.moveCursor(); const {cells, shown} = viewer.panels[1];"
         "return cells.filter((_, k) => !shown[k].reference).map(([cell]) => cell.textContent)"
     )
     assert values.count("–") == 2  # two have ended, another has not recorded it

@@ -75,7 +75,9 @@ def test_files_of_runs_are_named_by_the_page_alone(chromium, three):
 def test_files_of_a_difference_say_so(shown, chromium, three):
     opened(chromium, three, f"run?difference=true&shown={shown}".replace(" ", ""))
     drawn = [label for k, label in enumerate((A, B, C)) if k in shown and k]
-    for name, suffix in zip(chromium.driver.execute_async_script(SAVED), (".csv", ".svg", ".png"), strict=True):
+    for name, suffix in zip(
+        chromium.driver.execute_async_script(SAVED), (".csv", ".svg", ".png"), strict=True
+    ):
         assert name.startswith("run_") and name.endswith(f"minus_no_control{suffix}")
         assert "/" not in name and "fuzzy,_new" in name
     said, wide = chromium.run(WORDS)

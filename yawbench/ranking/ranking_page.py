@@ -22,7 +22,18 @@ from yawbench.orchestrator.scenario.overrides import changed
 from yawbench.proving_ground.sine_with_dwell import RATIOS, SPUN, course_of
 from yawbench.proving_ground.trace import trace_of
 from yawbench.reports.page_parts import FigureImage, Page, Part, anchor, image_of, option_of, render
-from yawbench.reports.viewer import DATA, Bound, Mark, Settings, View, assets, carried, embedded, tidy_sides, write_side
+from yawbench.reports.viewer import (
+    DATA,
+    Bound,
+    Mark,
+    Settings,
+    View,
+    assets,
+    carried,
+    embedded,
+    tidy_sides,
+    write_side,
+)
 from yawbench.studies.experiment import FIGURES
 from yawbench.studies.experiment_result import Each
 from yawbench.studies.jobs import STEP_TIME
@@ -39,6 +50,7 @@ from .ranking_scores import (
     RankingCell,
     RankingResult,
     apart_by_conditions,
+    best_beside,
     deciding_digits,
 )
 from .ranking_tables import (
@@ -49,6 +61,7 @@ from .ranking_tables import (
     interval_words,
     place_words,
     row_of,
+    run_label,
     runs_table,
     share_text,
     sign_of,
@@ -301,7 +314,7 @@ def _id(cell: RankingCell) -> str:
 
 def _side(
     ranked: RankingResult, score: EntryScore, cell: RankingCell, folder: Path
-) -> tuple[str, str, Path | None, str, Path]:
+) -> tuple[str, Sequence[tuple[str, Path]], str, Path]:
     """Return the arguments of `_write_side` for a cell."""
     condition, worst = ranked.ranking.conditions[cell.condition], cell.worst
     sums = {
@@ -312,10 +325,11 @@ def _side(
         **{key.replace("_", " "): _text(cell.number(key), UNITS[key]) for key in OTHERS},
         "time per step": _text(cell.number(STEP_TIME), "s"),
     }
-    label = (
-        f"{score.spec.title}, {'right' if worst.amplitude < 0 else 'left'} first, {degrees(worst.amplitude)}"
-    )
-    shows = worst.results is not None and worst.results.is_dir()
+    label = run_label(ranked, worst)
+    runs = [(label, worst.results)] if worst.results is not None and worst.results.is_dir() else []
+    best = best_beside(ranked.scores, cell)
+    if runs and best and best.results is not None and best.results.is_dir():
+        runs.append((run_label(ranked, best), best.results))
     details = CellPart(
         title=f"{score.spec.title}: {condition.title}",
         state=cell.state.value,
@@ -325,20 +339,20 @@ def _side(
         table=runs_table(cell),
         command=series_command(ranked, cell),
         again=again_command(ranked, cell, folder),
-        worst=f"Its worst run: {label}, {state_words(worst)}." if shows else "Its runs kept no results.",
+        worst=f"Its worst run: {label}, {state_words(worst)}." if runs else "Its runs kept no results.",
     )
-    return _id(cell), label, worst.results if shows else None, render(details), folder
+    return _id(cell), runs, render(details), folder
 
 
-def _write_side(key: str, label: str, results: Path | None, html: str, folder: Path) -> None:
+def _write_side(key: str, runs: Sequence[tuple[str, Path]], html: str, folder: Path) -> None:
     """Write the side file of a cell; without results, or unreadable ones, it has no run."""
     content = None
-    if results is not None:
+    if runs:
         with suppress(ResultsError):
-            run = load_results(results)
-            limits = [Bound("sideslip", side * SPUN, "20° of sideslip", 0) for side in (1.0, -1.0)]
-            settings = Settings([View(panels=SHOWN)], marks=_instants(run), limits=limits, largest=1)
-            content = carried([LabelledRun(label, run)], settings)
+            loaded = [LabelledRun(label, load_results(results)) for label, results in runs]
+            limits = [Bound("sideslip", side * SPUN, "20° of sideslip") for side in (1.0, -1.0)]
+            marks = _instants(loaded[0].results)
+            content = carried(loaded, Settings([View(panels=SHOWN)], marks=marks, limits=limits, largest=1))
     write_side(folder, key, content, html=html)
 
 

@@ -240,8 +240,8 @@ def chapter(
 def link_to_runs(findings: ExperimentResult, result: ClaimResult, numbers: Mapping[str, int]) -> str:
     """Return the state of the viewer that shows a claim's runs; "" if it has none of them.
 
-    The run that decides is the baseline; the signal that decides is highlighted, with its bound if that is one
-    of the signal's values.
+    The run that decides is the baseline; the signal that decides is highlighted, with its bound if that is
+    one of the signal's values.
 
     Args:
         findings: the experiment and its results.

@@ -26,7 +26,15 @@ from yawbench.foundation.errors import ResultsError
 from yawbench.foundation.messages import listed
 from yawbench.foundation.safe_files import write_whole
 from yawbench.measurements.measured_results import MeasuredResults
-from yawbench.metrics.expressions import Metric, MetricValue, columns_of, evaluate, metric, reference_of, while_moving
+from yawbench.metrics.expressions import (
+    Metric,
+    MetricValue,
+    columns_of,
+    evaluate,
+    metric,
+    reference_of,
+    while_moving,
+)
 from yawbench.metrics.measures import words
 from yawbench.orchestrator.results.reader import Results
 from yawbench.orchestrator.results.run_record import RunStatus
@@ -77,7 +85,7 @@ class View:
 
 
 class Mark(NamedTuple):
-    """An instant [s] with its text, as a vertical line; `run`: number of the run that it belongs to, or all."""
+    """An instant [s] with its text, as a vertical line; `run`: number of the run that has it, None: all."""
 
     time: float
     text: str

@@ -29,6 +29,7 @@ from yawbench.planner import Planner
 from .experiment import Case, LoadedExperiment, NamedRun, PlannedExperiment, plan_experiment
 from .experiment_result import Each, ExperimentResult, judge_records, judge_results
 from .jobs import Job, MeasuredRun, OnOutcome, Outcome, execute_each, pool_for, read_back, ready
+from .jobs import planned as planned_run
 from .journal import Journal
 from .on_demand import OnDemand
 
@@ -171,7 +172,9 @@ class Executor(AbstractContextManager["Executor"]):
                 else []
             )
 
-    def keeping(self, findings: ExperimentResult, numbers: Collection[int]) -> ExperimentResult:
+    def keeping(
+        self, findings: ExperimentResult, numbers: Collection[int], record: Sequence[str] = ()
+    ) -> ExperimentResult:
         """Return a result whose cases with these numbers keep their results.
 
         Which runs are worth keeping is known when all have been judged. Those without results are made
@@ -180,13 +183,20 @@ class Executor(AbstractContextManager["Executor"]):
         Args:
             findings: of an experiment with axes.
             numbers: of its cases.
+            record: signals, or patterns of names, that they record besides those of the experiment.
         """
         planned = findings.planned
         assert planned is not None
+        planner = Planner()
 
         def keeping(number: int) -> Job:
             job = planned.jobs[number]
-            return replace(job, keep=True) if number in numbers else job
+            if number not in numbers:
+                return job
+            if not record:
+                return replace(job, keep=True)
+            wider = replace(job, keep=True, record=(*job.record, *record))
+            return replace(wider, plan=planned_run(wider, planner)[1])
 
         jobs = OnDemand(range(len(planned.jobs)), keeping)
         lacking = {

@@ -420,7 +420,9 @@ def lost_notes(
     Of more than `most`, the first have notes, and a last note says how many more there are.
     """
     found = lost_among([events for _, events in runs], comparable=comparable)
-    notes = [f"{runs[number][0]}: lost because {'; '.join(map(str, reasons))}" for number, reasons, _ in found]
+    notes = [
+        f"{runs[number][0]}: lost because {'; '.join(map(str, reasons))}" for number, reasons, _ in found
+    ]
     if most is None or len(notes) <= most:
         return notes
     return [*notes[:most], f"{len(notes) - most} more runs were lost; the page says why"]
