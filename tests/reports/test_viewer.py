@@ -25,17 +25,9 @@ from yawbench.measurements.measured_results import MeasuredResults
 from yawbench.orchestrator.results.reader import Results
 from yawbench.orchestrator.results.run_record import RunRecord
 from yawbench.reports.page_parts import without_comments
-from yawbench.reports.viewer import (
-    MOST,
-    PANELS,
-    Settings,
-    View,
-    answer_of,
-    page,
-    still_of,
-    viewer,
-)
+from yawbench.reports.viewer import MOST, Settings, answer_of, page, still_of, viewer
 from yawbench.reports.viewer_data import pack
+from yawbench.reports.viewer_views import PANELS, View
 from yawbench.vocabulary.lane_change import lanes_of
 from yawbench.vocabulary.wheels import WHEELS
 

@@ -13,8 +13,9 @@ import pytest
 from tests.reports.browser import Browser
 from tests.reports.made_up import whole_car
 from yawbench.figures.panels import LabelledRun
-from yawbench.reports.viewer import Bound, Mark, Settings, View, page
+from yawbench.reports.viewer import Settings, page
 from yawbench.reports.viewer_data import COARSE
+from yawbench.reports.viewer_views import Bound, Mark, View
 
 VIEWER = "const viewer = document.querySelector('.yv').viewer;"
 A, B, C = "no control", "fuzzy, new", "third/law"

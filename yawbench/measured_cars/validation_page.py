@@ -16,7 +16,8 @@ from yawbench.metrics.verdict import SYMBOLS, apart, worded
 from yawbench.orchestrator.results.reader import Results
 from yawbench.reports.evaluation_page import drawn
 from yawbench.reports.page_parts import Document, render
-from yawbench.reports.viewer import LARGEST, Bound, Settings, View, assets, viewer
+from yawbench.reports.viewer import LARGEST, Settings, assets, viewer
+from yawbench.reports.viewer_views import Bound, View
 from yawbench.studies.tables import Table
 
 

@@ -22,18 +22,8 @@ from yawbench.orchestrator.scenario.overrides import changed
 from yawbench.proving_ground.sine_with_dwell import RATIOS, SPUN, course_of
 from yawbench.proving_ground.trace import trace_of
 from yawbench.reports.page_parts import FigureImage, Page, Part, anchor, image_of, option_of, render
-from yawbench.reports.viewer import (
-    DATA,
-    Bound,
-    Mark,
-    Settings,
-    View,
-    assets,
-    carried,
-    embedded,
-    tidy_sides,
-    write_side,
-)
+from yawbench.reports.viewer import DATA, LEAST, Settings, assets, carried, embedded, tidy_sides, write_side
+from yawbench.reports.viewer_views import Bound, Mark, View
 from yawbench.studies.experiment import FIGURES
 from yawbench.studies.experiment_result import Each
 from yawbench.studies.jobs import STEP_TIME
@@ -352,7 +342,9 @@ def _write_side(key: str, runs: Sequence[tuple[str, Path]], html: str, folder: P
             loaded = [LabelledRun(label, load_results(results)) for label, results in runs]
             limits = [Bound("sideslip", side * SPUN, "20° of sideslip") for side in (1.0, -1.0)]
             marks = _instants(loaded[0].results)
-            content = carried(loaded, Settings([View(panels=SHOWN)], marks=marks, limits=limits, largest=1))
+            content = carried(
+                loaded, Settings([View(panels=SHOWN)], marks=marks, limits=limits, largest=LEAST)
+            )
     write_side(folder, key, content, html=html)
 
 

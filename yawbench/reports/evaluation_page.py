@@ -30,7 +30,8 @@ from yawbench.studies.tables import Table
 from yawbench.vocabulary.signals import SIGNALS
 
 from .page_parts import Document, render
-from .viewer import LARGEST, MOST, Bound, Mark, Settings, View, assets, viewer
+from .viewer import LARGEST, MOST, Settings, assets, viewer
+from .viewer_views import Bound, Mark, View
 
 PANELS = ("steering_wheel_angle", "yaw_rate", "sideslip", "acceleration_y", "cone_overrun")
 """Signals shown first, where they are recorded; chosen: what most tests judge."""

@@ -61,18 +61,8 @@ from .diagram import diagram, systems_of
 from .page_parts import Document, FigureImage, Page, anchor, image_of
 from .provenance import ParameterGroup, count_kinds, fmus_of, groups_of, programs_of
 from .sweep_view import SWEEP_ASSETS, sweep_sentence, sweep_view, write_sides
-from .viewer import (
-    LARGEST,
-    MOST,
-    PANELS,
-    Carried,
-    Settings,
-    View,
-    answer_of,
-    assets,
-    carried,
-    embedded,
-)
+from .viewer import LARGEST, MOST, Carried, Settings, answer_of, assets, carried, embedded
+from .viewer_views import PANELS, View
 
 
 @dataclass(frozen=True)

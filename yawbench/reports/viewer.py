@@ -8,6 +8,7 @@ installed package `uplot-python`.
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import accumulate, pairwise
@@ -41,8 +42,10 @@ from yawbench.orchestrator.results.run_record import RunStatus
 from yawbench.orchestrator.scenario.overrides import with_changes
 
 from .page_parts import Assets, Document, Part, render, static, without_comments
+from .planes import planes_of
 from .road import legend_of, notes_of, road_of, without_tyres
 from .viewer_data import PackedRun, is_numeric, pack
+from .viewer_views import Bound, Mark, View
 
 SCRIPTS = (
     "viewer_data.js", "viewer_panels.js", "viewer_draw.js", "viewer_picture.js", "viewer_events.js",
@@ -53,8 +56,6 @@ MOST = 200
 """Largest number of runs in one viewer. Chosen: beyond the runs of any study; colours repeat after seven."""
 FIRST = 14
 """Largest number of runs shown at first, where none are chosen. Chosen: two of each of seven colours."""
-PANELS = ("sideslip", "yaw_rate", "acceleration_y", "yaw_moment", "steer_angle")
-"""Signals shown first, with their references; chosen: what all four papers draw."""
 METRICS = ("peak(sideslip)", "peak(yaw_rate)", "peak(acceleration_y)", "peak(yaw_moment)")
 """Metrics in the table of runs, by default."""
 FEW = 4
@@ -62,54 +63,10 @@ FEW = 4
 LARGEST = 2_200_000
 """Size of the samples in a page [bytes]. Chosen: with its text a page of 2.5 MB, which opens at once, also by
 mail."""
+LEAST = 1
+"""Size of the samples of runs in files of their own: the signals of views and road alone, without planes."""
 STILL = ("sideslip", "yaw_rate")
 """Signals whose largest value sets the cursor at first."""
-
-
-@dataclass(frozen=True)
-class View:
-    """A selection of runs and signals that the reader can choose.
-
-    Attributes:
-        title: of the choice.
-        panels: signals, `instance.variable` or the variable alone, `x_error` for its error, `x - y`; a comma
-            overlays further ones.
-        shown: numbers of the runs; None: all, up to `FIRST`.
-        x: signal on the horizontal axis, or time.
-    """
-
-    title: str = ""
-    panels: Sequence[str] = PANELS
-    shown: Sequence[int] | None = None
-    x: str = "time"
-
-
-class Mark(NamedTuple):
-    """An instant [s] with its text, as a vertical line; `run`: number of the run that has it, None: all."""
-
-    time: float
-    text: str
-    run: int | None = None
-
-
-class Bound(NamedTuple):
-    """A bound of a signal in SI units with its text, as a horizontal line; `run`: as of a `Mark`."""
-
-    signal: str
-    value: float
-    text: str
-    run: int | None = None
-
-
-class Curve(NamedTuple):
-    """A curve in the plane of two signals, in their SI units, with its text; `run`: as of a `Mark`."""
-
-    x: str
-    y: str
-    text: str
-    xs: Sequence[float]
-    ys: Sequence[float]
-    run: int | None = None
 
 
 @dataclass(frozen=True)
@@ -119,7 +76,7 @@ class Settings:
     Attributes:
         views: to choose from; the first is shown at first.
         metrics: those in the table of runs.
-        marks, limits, curves: dashed lines; those of a run are hidden with it.
+        marks, limits: dashed lines; those of a run are hidden with it.
         largest: size of the samples [bytes]; beyond it, the page carries the signals of the views and of the
             road alone, and still beyond it, of the road without the forces of the tyres. 0: no limit.
         ghosts: numbers of runs that are drawn faintly behind the others.
@@ -132,7 +89,6 @@ class Settings:
     metrics: Sequence[str] = METRICS
     marks: Sequence[Mark] = ()
     limits: Sequence[Bound] = ()
-    curves: Sequence[Curve] = ()
     largest: int = 0
     ghosts: Sequence[int] = ()
     bands: Sequence[int] = ()
@@ -231,7 +187,8 @@ def carried(
     results = [run.results for run in runs]
     grounds: list[Any] = []
     roads = [road_of(run.results, grounds) for run in runs]
-    drawn = [_drawn(view, results) for view in settings.views]
+    planes, curves = ([], []) if settings.largest == LEAST else planes_of(results)
+    drawn = [_drawn(view, results) for view in (*settings.views, *planes)]
     views = [view for view in drawn if view["panels"]] or drawn[:1]
     packed = packed or pack(results)
     notes = [notes_of(run.results, road) for run, road in zip(runs, roads, strict=True)]
@@ -254,8 +211,9 @@ def carried(
         "marks": [list(mark) for mark in settings.marks],
         "curves": [
             [x, y, text, [*xs], [*ys], run]
-            for x_name, y_name, text, xs, ys, run in settings.curves
-            for x, y in zip(_columns(results, x_name), _columns(results, y_name), strict=False)
+            for x_name, y_name, text, xs, ys, run in curves
+            for x, y in zip(_columns(results, x_name), _panels(results, y_name), strict=False)
+            for y in [y.partition(",")[0]]
         ],
         "why": [
             [number, [_sentence(reason, number, best, reasons[-1]) for reason in reasons], best]
@@ -410,6 +368,11 @@ def _drawn(view: View, results: Sequence[Results]) -> dict[str, Any]:
 def _panels(results: Sequence[Results], spec: str) -> Iterator[str]:
     """Yield the panels that a name selects: columns, each with the column of its reference."""
     first, *others = (part.strip() for part in spec.split(","))
+    if " + " in first:
+        terms = [_columns(results, term)[:1] for term in first.split(" + ")]
+        if all(terms):
+            yield " + ".join(column for term in terms for column in term)
+        return
     minuend, _, subtrahend = first.partition(" - ")
     error = minuend.removesuffix("_error")
     for column in _columns(results, minuend) or _columns(results, error):
@@ -426,7 +389,8 @@ def _panels(results: Sequence[Results], spec: str) -> Iterator[str]:
 def _needed(views: Sequence[Mapping[str, Any]], roads: Sequence[Mapping[str, Any] | None]) -> set[str]:
     """Return the columns of all views and roads."""
     panels = (panel for view in views for panel in view["panels"])
-    named = {part.strip() for panel in panels for spec in panel.split(",") for part in spec.split(" - ")}
+    named = {part for panel in panels for spec in panel.split(",") for part in re.split(" [-+] ", spec)}
+    named |= {view["x"] for view in views}
     return named | {name for road in roads for name in (road or {}).values() if isinstance(name, str)}
 
 

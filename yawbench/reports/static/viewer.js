@@ -309,11 +309,12 @@ class Viewer extends InAddress {
   dash(run) { return run.dash || this.data.dashes[this.style(run)]; }
 
   meaning(name) {
-    const [one, other] = name.split(' - ').map((part) => this.data.signals[part]);
+    const [first, ...rest] = name.split(/ ([-+]) /);
+    const one = this.data.signals[first];
     if (!one) return {label: name, unit: '', factor: 1};
-    if (!other) return one;
-    const reference = name.endsWith(`${name.split(' - ')[0].replace(/^.*\./, '')}_ref`);
-    return {...one, label: reference ? `${one.label}, error` : `${one.label} minus ${other.label.toLowerCase()}`};
+    if (name.endsWith(` - ${rest[1]}`) && rest[1].endsWith(`${first.replace(/^.*\./, '')}_ref`)) return {...one, label: `${one.label}, error`};
+    const words = rest.map((part) => ({'-': 'minus', '+': 'plus'}[part] ?? this.data.signals[part].label.toLowerCase()));
+    return {...one, label: [one.label, ...words].join(' ')};
   }
 
   // A piece of a run's line; `reference`: the colour of its reference, which is wide.
@@ -363,7 +364,8 @@ class Viewer extends InAddress {
   // The signals of a text of the reader, by name, by variable, by label or by a part of one, as a panel names them.
   // Throw a sentence for the reader if there are none or several.
   named(text) {
-    return text.split(',').map((spec) => spec.trim().split(' - ').map((part) => this.signalOf(part.trim())).join(' - ')).join(',');
+    const signal = (part) => (/^ [-+] $/.test(part) ? part : this.signalOf(part.trim()));
+    return text.split(',').map((spec) => spec.trim().split(/( [-+] )/).map(signal).join('')).join(',');
   }
 
   signalOf(text) {
@@ -383,7 +385,7 @@ class Viewer extends InAddress {
     throw new Error(partial ? `this page has no signal ${text}; yawbench plot --page shows all that was recorded` : `no signal ${text} was recorded`);
   }
 
-  known(spec) { return spec.split(',').every((name) => name.trim().split(' - ').every((part) => part in this.data.signals)); }
+  known(spec) { return spec.split(',').every((name) => partsOf(name.trim()).every((part) => part in this.data.signals)); }
 
   // ---- the horizontal axis ----
 
@@ -409,6 +411,7 @@ class Viewer extends InAddress {
   whole() {
     let range = [Infinity, -Infinity];
     for (const run of this.runs) if (this.shows(run)) range = extremes(this.horizontal(run), range);
+    for (const [, xs] of this.state.panels.flatMap((spec) => this.curves(spec))) if (xs[0] === xs.at(-1)) range = extremes(xs, range); // closed
     if (!(range[0] <= range[1])) return [0, 1];
     if (this.state.x !== 'time' && this.state.x !== 'distance') {
       const room = 0.04 * (range[1] - range[0]) || 1;

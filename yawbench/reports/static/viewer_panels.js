@@ -109,7 +109,7 @@ class Panel {
     const found = [];
     for (const [k, name] of this.signals.entries()) {
       for (const run of viewer.runs) {
-        if (!run.has(name) || (run.band && x === 'time') || (k > 0 && !viewer.shows(run))) continue;
+        if (!run.has(name) || (run.band && x === 'time') || (k > 0 && (viewer.portrait || !viewer.shows(run)))) continue;
         if (difference && (k > 0 || !viewer.baseline.has(name) || run === viewer.baseline)) continue;
         const values = difference ? viewer.fromBaseline(run, name) : run.column(name);
         const line = {run, name, values, grain: viewer.grain(run, name), xs: viewer.horizontal(run), reference: k > 0};
@@ -249,6 +249,7 @@ class Panel {
       }
     }
     range = extremes(this.limits().map(([bound]) => bound * factor), range);
+    for (const [, xs, ys] of this.viewer.curves(this.signals[0])) range = extremes(ys.filter((_, i) => xs[i] >= from && xs[i] <= to).map((y) => y * factor), range);
     if (!(range[0] <= range[1])) return [-1, 1];
     const room = 0.07 * (range[1] - range[0]) || Math.abs(range[0]) * 0.1 || 1;
     return [range[0] - room, range[1] + (this.marks().some(({text: says}) => says) ? 3 : 1) * room]; // above: their words
@@ -314,7 +315,7 @@ class Panel {
       polyline(c, px, py);
       stroke(c, viewer.theme.mark, 1.3, ratio, [4, 3]);
       const at = px.findIndex((x, i) => x > left + 8 * ratio && x < left + 0.75 * width && py[i] > top + 14 * ratio && py[i] < top + height - 14 * ratio);
-      if (says && at >= 0) text(c, says, px[at] + 5 * ratio, py[at], words);
+      if (says && at >= 0) text(c, says, px[at] + 5 * ratio, py[at] - 8 * ratio, words);
     }
     c.restore();
     const rows = Array.from({length: Math.max(1, Math.floor(height / ratio / 32))}, () => -Infinity); // ends of the words in each

@@ -78,6 +78,7 @@ function splitsOf({min, max}, count) {
 function layoutOf(viewer, width) {
   const c = new SvgPaper();
   c.font = '13px system-ui, sans-serif';
+  const [from, to] = viewer.span();
   const title = viewer.drawnInstead;
   let [x, y] = [8, title ? LINE_HIGH + 4 : 4];
   const legend = viewer.drawnRuns().map((run) => {
@@ -91,7 +92,7 @@ function layoutOf(viewer, width) {
   const panels = viewer.panels.filter((panel) => panel.plot).map((panel) => {
     const height = panel.plot.over.clientHeight;
     y += LINE_HIGH + height + 6;
-    const frame = {left: AXIS_WIDTH, top: y - height - 6, width: width - AXIS_WIDTH - 12, height, across: panel.plot.scales.x, up: panel.plot.scales.y};
+    const frame = {left: AXIS_WIDTH, top: y - height - 6, width: width - AXIS_WIDTH - 12, height, across: {min: from, max: to}, up: panel.plot.scales.y};
     return {panel, frame, head: y - height - 6 - LINE_HIGH / 2};
   });
   return {title, legend, panels, axis: y, height: y + 2 * LINE_HIGH};
@@ -101,6 +102,7 @@ function drawPicture(c, viewer, width, {title, legend, panels, axis, height}) {
   const {theme} = viewer;
   const words = {colour: theme.ink, size: 13, halo: false};
   const quiet = {colour: theme.quiet, size: 12, halo: false};
+  c.lineJoin = 'round';
   c.fillStyle = theme.ground;
   c.fillRect(0, 0, width, height);
   if (title) text(c, title, 8, LINE_HIGH / 2 + 2, {...words, size: 15});
