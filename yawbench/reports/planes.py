@@ -30,22 +30,28 @@ SLOWEST = 1.0
 AXLES = {"front axle": ("fl", "fr"), "rear axle": ("rl", "rr")}
 
 
+PLANES = (
+    View("Sideslip rate over sideslip", ["sideslip_rate"], x="sideslip"),
+    View("Yaw rate over sideslip", ["yaw_rate"], x="sideslip"),
+    View("g-g: longitudinal over lateral acceleration", ["acceleration_x"], x="acceleration_y"),
+    *(
+        View(
+            f"Lateral force over slip angle, {axle}",
+            [f"tyre_force_y_{left} + tyre_force_y_{right}"],
+            x=f"slip_angle_{left}",
+        )
+        for axle, (left, right) in AXLES.items()
+    ),
+)
+
+
 def planes_of(runs: Sequence[Results]) -> tuple[list[View], list[Curve]]:
     """Return the views of the planes whose signals any run has, and their curves."""
-    views = [view for view in _views() if any(_has(run, view) for run in runs)]
-    curves = list(_stability()) + [
+    views = [view for view in PLANES if any(_has(run, view) for run in runs)]
+    curves = [*_stability()] + [
         curve for number, run in enumerate(runs) for curve in (*_friction(run, number), *_axles(run, number))
     ]
     return views, curves
-
-
-def _views() -> Iterator[View]:
-    yield View("Sideslip rate over sideslip", ["sideslip_rate"], x="sideslip")
-    yield View("Yaw rate over sideslip", ["yaw_rate"], x="sideslip")
-    yield View("g-g: longitudinal over lateral acceleration", ["acceleration_x"], x="acceleration_y")
-    for axle, (left, right) in AXLES.items():
-        force = f"tyre_force_y_{left} + tyre_force_y_{right}"
-        yield View(f"Lateral force over slip angle, {axle}", [force], x=f"slip_angle_{left}")
 
 
 def _has(run: Results, view: View) -> bool:

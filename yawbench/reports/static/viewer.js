@@ -513,9 +513,7 @@ class Viewer extends InAddress {
 
   setPin(on = this.state.pin === null) {
     this.state.pin = on ? this.state.time : null;
-    this.root.classList.toggle('yv-pinned', on);
-    this.find('pin').setAttribute('aria-pressed', on);
-    this.redraw();
+    this.refresh();
   }
 
   moveCursor() {

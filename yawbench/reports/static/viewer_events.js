@@ -1,6 +1,6 @@
 // The events of the shown runs as a list, and why cars were lost: a click goes to the instant.
 
-const MOST_EVENTS = 60; // listed at once; chosen: what a reader looks through
+const MOST_EVENTS = 8; // listed at once; chosen: what a reader looks through
 
 class Events {
   constructor(viewer) {
@@ -8,7 +8,9 @@ class Events {
     Object.assign(this, {viewer, why, list, rest, count, all: false, key: ''});
     this.lines = viewer.data.why.map((reasons) => [viewer.runs[reasons[0]], this.sentences(reasons)]);
     why.append(...this.lines.map(([, line]) => line));
-    list.closest('details').hidden = !viewer.runs.some((run) => run.events.length);
+    this.details = list.closest('details');
+    this.details.hidden = !viewer.runs.some((run) => run.events.length);
+    this.details.addEventListener('toggle', () => { this.key = ''; this.fill(); });
     rest.addEventListener('click', () => { this.all = true; this.key = ''; this.fill(); });
     viewer.subscribe(() => this.fill());
   }
@@ -53,13 +55,14 @@ class Events {
     const most = this.all ? Infinity : MOST_EVENTS;
     this.rest.hidden = found.length <= most;
     this.rest.textContent = `All ${found.length} events`;
+    if (!this.details.open) return;
     this.list.replaceChildren(...found.slice(0, most).map(({run, time, label, far, until}) => {
       const row = made('tr');
       const at = made('button', `${time.toFixed(3)} s`, {type: 'button'});
       at.addEventListener('click', () => viewer.goTo(time, run.number));
-      row.append(made('td', at));
-      if (viewer.runs.length > 1) row.append(made('td', made('span', '', {innerHTML: viewer.swatch(run), title: run.label, role: 'img', ariaLabel: run.label})));
-      row.append(made('td', `${label}${until === null ? '' : `, until ${until.toFixed(2)} s`}${far ? `: ${far}` : ''}`));
+      const said = made('td', '', {innerHTML: viewer.runs.length > 1 ? viewer.swatch(run) : '', title: run.label});
+      said.append(` ${label}${until === null ? '' : `, until ${until.toFixed(2)} s`}${far ? `: ${far}` : ''}`);
+      row.append(made('td', at), said);
       return row;
     }));
   }

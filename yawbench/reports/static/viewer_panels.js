@@ -139,8 +139,9 @@ class Panel {
     root.setAttribute('aria-label', label);
     root.innerHTML = '<header><h4></h4><small></small><output></output><span class="yv-tools"></span></header>'
       + '<div class="yv-chart"></div><table><caption class="yv-hidden"></caption>'
-      + '<thead class="yv-hidden"><tr><th scope="col">run</th><th scope="col">at the cursor</th><th scope="col">since the pin</th>'
-      + '<th scope="col">smallest</th><th scope="col">largest</th></tr></thead><tbody></tbody></table><p class="yv-hidden"></p>';
+      + '<thead class="yv-hidden"><tr><th scope="col">run</th><th scope="col">at the cursor</th>'
+      + `${viewer.state.pin === null ? '' : '<th scope="col">since the pin</th>'}</tr></thead><tbody>`
+      + '</tbody></table><p class="yv-hidden"></p>';
     root.querySelector('h4').textContent = this.title;
     root.querySelector('h4').setAttribute('aria-level', viewer.level);
     const names = root.querySelector('small');
@@ -211,7 +212,7 @@ class Panel {
     this.plot = new viewer.Plot(options, [viewer.span(), ...shown.map(() => [0, 0])], this.chart);
     this.plot.root.setAttribute('aria-hidden', 'true');
     [this.pointer, this.pinned, this.box] = ['pointer', 'pin', 'box'].map((name) => made('div', '', {className: `yv-${name}`}));
-    this.plot.over.append(this.pointer, this.pinned, this.box);
+    this.plot.over.append(this.pointer, ...(viewer.state.pin === null ? [] : [this.pinned]));
     this.dots = shown.map(({colour}) => {
       const dot = made('i', '', {className: 'yv-dot'});
       dot.style.background = colour;
@@ -378,13 +379,13 @@ class Panel {
       if (!down.has(event.pointerId)) return;
       const [now] = [at(event)];
       down.delete(event.pointerId);
-      this.box.style.display = '';
+      this.box.remove();
       if (begun?.how === 'box' && begun.moved) this.boxed(begun.points[0], now);
       else if (begun && !begun.moved && begun.how !== 'pinch') viewer.pointAt(this, ...now);
       begun = null;
     };
     over.addEventListener('pointerup', end);
-    over.addEventListener('pointercancel', (event) => { down.delete(event.pointerId); begun = null; this.box.style.display = ''; });
+    over.addEventListener('pointercancel', (event) => { down.delete(event.pointerId); begun = null; this.box.remove(); });
     over.addEventListener('dblclick', () => viewer.showWhole());
     over.addEventListener('wheel', (event) => {
       if (!event.ctrlKey && !event.shiftKey && !event.altKey) return;
@@ -419,7 +420,8 @@ class Panel {
       viewer.panTo(held - (middle(now) / wide) * span, span);
     } else if (begun.how === 'box') {
       const [left, top, right, bottom] = this.corners(begun.points[0], [x, y]);
-      Object.assign(this.box.style, {display: 'block', left: `${left}px`, top: `${top}px`, width: `${right - left}px`, height: `${bottom - top}px`});
+      this.plot.over.append(this.box);
+      Object.assign(this.box.style, {left: `${left}px`, top: `${top}px`, width: `${right - left}px`, height: `${bottom - top}px`});
     }
   }
 
@@ -496,7 +498,7 @@ class Panel {
       if (seen) this.dots[k].style.transform = `translate(${x}px, ${y}px)`;
       const [cell, since] = this.cells[k];
       cell.textContent = this.known(value, line);
-      since.textContent = pin === null ? '' : this.known(value - before, line, '+');
+      if (since) since.textContent = this.known(value - before, line, '+');
     });
     for (const [pointer, t] of [[this.pointer, time], [this.pinned, pin]]) {
       const row = t === null ? -1 : this.rowAt({run: viewer.lead()}, t);
@@ -526,10 +528,9 @@ class Panel {
       const head = made('th', '', {scope: 'row', title, innerHTML: viewer.swatch(run, reference && colour)});
       head.append(made('span', title, {className: 'yv-hidden'}));
       row.append(head);
-      this.cells.push([row.insertCell(), row.insertCell()]);
+      this.cells.push([row.insertCell(), viewer.state.pin === null ? null : row.insertCell()]);
       const [low, high] = extremes(values);
       const texts = low <= high ? [low, high].map((one) => knownDigits(one * factor, CURSOR_DIGITS, grain * Math.abs(factor))) : ['no number', 'no number'];
-      row.append(...texts.map((one) => made('td', one, {className: 'yv-hidden'})));
       words.push(`${title}: ${texts.join(' to ')}`);
     }
     this.sentence.textContent = words.length ? `${words.join('; ')} ${this.meaning.unit}.` : 'No shown run has recorded it.';
