@@ -458,8 +458,8 @@ class Panel {
     const found = [];
     for (const {run, values, xs, grain, reference} of this.shown) {
       if (reference || run.band) continue;
-      let best = -1;
-      for (let i = 0; i < xs.length; i++) if (xs[i] >= from && xs[i] <= to && !(Math.abs(values[i]) <= Math.abs(values[best] ?? -1)) && Number.isFinite(values[i])) best = i;
+      let [best, most] = [-1, -1];
+      for (let i = 0; i < xs.length; i++) if (xs[i] >= from && xs[i] <= to && Math.abs(values[i]) > most) [best, most] = [i, Math.abs(values[i])];
       if (best >= 0) found.push({run, time: run.shifted[best], value: values[best], grain, growing: best === run.rows - 1 && run.rows > 1});
     }
     return found.sort((one, other) => Math.abs(other.value) - Math.abs(one.value));
