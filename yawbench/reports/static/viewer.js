@@ -25,9 +25,11 @@ function readAddress(key) {
 
 // Every step that can be undone is an entry of the browser's history, with its number.
 let depth = history.state?.depth ?? 0;
+let followed = false; // whether the address is that of a link just followed, which says nothing of the other parts
 history.replaceState({depth}, '');
 addEventListener('hashchange', () => {
   const {state} = history;
+  followed = !state;
   if (!state) history.replaceState({depth: depth + 1, link: !location.hash.includes('?')}, ''); // a link of the page
   depth = history.state.depth;
 });
@@ -74,7 +76,7 @@ class InAddress {
   // nothing is back to the beginning.
   restore() {
     if (location.hash === this.written) return false;
-    const own = readAddress(this.key) ?? (this.lasting === undefined || history.state?.link ? null : new URLSearchParams());
+    const own = readAddress(this.key) ?? (this.lasting === undefined || followed || history.state?.link ? null : new URLSearchParams());
     if (!own) { this.lasting ??= this.lasts(); return false; }
     const [state, kinds] = [this.initial(), this.kinds()];
     for (const [name, text] of own) {
