@@ -31,7 +31,7 @@ from yawbench.orchestrator.results.run_record import RunRecord, RunStatus
 from yawbench.orchestrator.scenario.loader import LoadedScenario
 from yawbench.orchestrator.scenario.overrides import changed
 from yawbench.planner import Planner
-from yawbench.studies.claims import ClaimResult, Comparison
+from yawbench.studies.claims import ClaimResult, Comparison, OpenValueScan
 from yawbench.studies.confidence import CONFIDENCE
 from yawbench.studies.experiment import FIGURES
 from yawbench.studies.experiment_result import Each, ExperimentResult
@@ -86,6 +86,7 @@ class JudgedClaim:
     agreeing: float | None
     robust: bool  # whether less than a tenth of the region flips the verdict
     lines: Table | None  # values along the lines of the region
+    strip: Markup  # the same drawn: the margin at each level of each open value; "" without a region
     link: str  # state of the viewer that shows the claim's runs; "" if it has none of them
 
 
@@ -361,7 +362,53 @@ def judged(result: ClaimResult, link: str) -> JudgedClaim:
         agreeing=100 * result.region.agreeing if result.region else None,
         robust=result.region is not None and result.region.robust,
         lines=line_table(result) if result.region else None,
+        strip=margin_strip(result.region.lines) if result.region else Markup(""),
         link=link,
+    )
+
+
+STRIP = (150, 360, 16)
+"""Where the margins of a strip begin and end, and the height of an open value [pixels]."""
+LABEL = 24
+"""Characters of an open value that have room in the strip."""
+
+
+def margin_strip(scans: Sequence[OpenValueScan]) -> Markup:
+    """Return the margins at the levels of each open value as a drawing, a line each: the verdict flips at 0.
+
+    Margins beyond 100 % are drawn at the end of their side; the chosen value has a ring.
+    """
+    begin, end, high = STRIP
+    middle, half = (begin + end) / 2, (end - begin) / 2 - 8
+    dots: dict[str, list[str]] = {"good": [], "bad": [], "ring": []}
+    texts, axes = [], []
+    for row, scan in enumerate(scans):
+        y = high * row + 10
+        label = scan.says if len(scan.says) <= LABEL else f"{scan.says[: LABEL - 1]}…"
+        texts.append(Markup('<text x="0" y="{}">{}</text>').format(y + 4, label))
+        axes.append(f"M{begin} {y}H{end}")
+        for level in (scan.chosen, *scan.levels):
+            margin = level.verdict.margin
+            if margin is None:
+                continue
+            x, radius = middle + half * max(-1.0, min(1.0, margin)), 5 if level is scan.chosen else 3
+            arc = f"a{radius} {radius} 0 1 0"
+            circle = f"M{x - radius:.1f} {y}{arc} {2 * radius} 0{arc} {-2 * radius} 0"
+            dots["ring" if level is scan.chosen else "good" if level.verdict.holds else "bad"].append(circle)
+    bottom = high * len(scans) + 4
+    ends = [(begin, "start", "−100 %"), (middle, "middle", "flips"), (end, "end", "100 %")]
+    texts += [
+        Markup('<text x="{}" y="{}" text-anchor="{}">{}</text>').format(x, bottom + 12, anchored, words)
+        for x, anchored, words in ends
+    ]
+    paths = [f'<path class="axis" d="{"".join(axes)}M{middle} 2V{bottom}"/>']
+    paths += [f'<path class="{kind}" d="{"".join(circles)}"/>' for kind, circles in dots.items() if circles]
+    drawing = Markup("".join(paths)) + Markup("").join(texts)
+    says = (
+        "The margin at each level of each open value; the ring is the chosen one. The table has the numbers."
+    )
+    return Markup('<svg class="strip" viewBox="0 0 {} {}" role="img" aria-label="{}">{}</svg>').format(
+        end + 2, bottom + 16, says, drawing
     )
 
 
