@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
 from yawbench.foundation import plugins
-from yawbench.foundation.errors import ResultsError, ScenarioError
+from yawbench.foundation.errors import ResultsError, ScenarioError, YawbenchError
 from yawbench.foundation.workers import Pool
 from yawbench.orchestrator.plan import Plan
 from yawbench.orchestrator.results.freshness import staleness
@@ -193,10 +193,14 @@ class Executor(AbstractContextManager["Executor"]):
             job = planned.jobs[number]
             if number not in numbers:
                 return job
+            kept = replace(job, keep=True)
             if not record:
-                return replace(job, keep=True)
-            wider = replace(job, keep=True, record=(*job.record, *record))
-            return replace(wider, plan=planned_run(wider, planner)[1])
+                return kept
+            wider = replace(kept, record=(*job.record, *record))
+            try:
+                return replace(wider, plan=planned_run(wider, planner)[1])
+            except YawbenchError:  # of an FMU that is an object of the caller: it was planned with it
+                return kept
 
         jobs = OnDemand(range(len(planned.jobs)), keeping)
         lacking = {
