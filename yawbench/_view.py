@@ -14,7 +14,7 @@ from yawbench.foundation.safe_files import reason, write_whole
 from yawbench.metrics.expressions import columns_of
 from yawbench.orchestrator.scenario.overrides import changed
 from yawbench.reports.viewer import SETTINGS, Settings, page
-from yawbench.reports.viewer import View as Selection
+from yawbench.reports.viewer_views import View as Selection
 
 from . import arguments
 from ._run import Run

@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.orchestrator.recorded import write
+from tests.orchestrator.recorded import noted, write
 from tests.refusals import each_mentions
 from tests.reports.browser import Browser
 from tests.reports.flaws import inaccessible
@@ -48,7 +48,10 @@ def folder(tmp_path_factory) -> Path:
     write(whole_car(), outside / "run")
     place = tmp_path_factory.mktemp("results")
     for name, gain in (("one", 1.0), ("two", 2.0)):
-        write(whole_car(gain), place / "runs" / name)
+        run, peaks = whole_car(gain), {}
+        for end, of in (("smallest", np.min), ("largest", np.max)):
+            peaks[end] = {"plant.sideslip": float(of(run["plant.sideslip"]))}
+        write(noted(run, units=run.units, **peaks), place / "runs" / name)
     (place / "runs/both.html").write_text(page(labelled(whole_car(), whole_car(2.0))), "utf-8")
     (place / "link.html").symlink_to(outside / "secret.txt")
     (place / "out").symlink_to(outside, target_is_directory=True)
@@ -205,6 +208,27 @@ def test_the_first_page_lists_pages_and_runs_that_are_no_links(server):
     assert sorted(re.findall(r'name="run" value="([^"]+)"', text)) == ["runs/one", "runs/two"]
     assert "1 page, 2 runs" in text
     assert f"<option>{SCENARIO}</option>" in text
+
+
+def test_runs_are_found_by_what_was_changed_sorted_and_folded(server, chromium: Browser):
+    chromium.driver.get(server.address)
+    chromium.wait_for("document.querySelector('.found').textContent")
+    names = (
+        "return [...document.querySelectorAll('.results tbody tr:not(.group)')].filter((row) => !row.hidden)"
+        ".map((row) => row.querySelector('input').value)"
+    )
+    press = "document.querySelectorAll('.results thead button')[2].click()"
+    chromium.run(press)  # peak sideslip
+    assert chromium.run(names) == ["runs/one", "runs/two"]
+    chromium.run(press)
+    assert chromium.run(names) == ["runs/two", "runs/one"]
+    chromium.run(
+        "const field = document.querySelector('.filter'); field.value = 'RUNS/two';"
+        "field.dispatchEvent(new Event('input'))"
+    )
+    assert chromium.run(names) == ["runs/two"]
+    assert chromium.run("return document.querySelector('.found').textContent") == "1 of 2"
+    assert chromium.console() == []
 
 
 def test_pages_are_served_as_they_are_and_sandboxed(server, folder):

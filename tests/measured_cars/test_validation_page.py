@@ -112,7 +112,7 @@ def test_the_page_carries_run_band_and_tests_to_the_side_of_the_run(made, page):
     assert [run["band"] for run in data["runs"]] == 5 * [False] + [True]
     assert [view["x"] for view in data["views"]] == ["plant.acceleration_y", "time"]
     assert data["views"][1]["shown"] == [0, 1, 2, 3, 4]
-    assert {name for name, _, _ in data["limits"]} == {"steering_wheel_angle.distance"}
+    assert {name for name, *_ in data["limits"]} == {"steering_wheel_angle.distance"}
 
 
 def test_decoded_samples_equal_those_of_the_car(chromium: Browser, made, page):

@@ -25,7 +25,7 @@ import os
 import secrets
 import stat
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from functools import partial
@@ -33,16 +33,21 @@ from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from mimetypes import guess_type
 from pathlib import Path
+from typing import NamedTuple
 from urllib.parse import parse_qs, quote, unquote_to_bytes, urlsplit
 
-from yawbench.figures.display import LabelledRun
+from yawbench.events.why import why
+from yawbench.figures.display import LabelledRun, shown
 from yawbench.foundation.errors import ResultsError, YawbenchError
 from yawbench.foundation.messages import printable
 from yawbench.foundation.safe_files import NO_FOLLOW
+from yawbench.metrics.measures import words
+from yawbench.metrics.verdict import Status, VerdictText
 from yawbench.orchestrator.results.file_formats import FILES
 from yawbench.orchestrator.results.reader import FoundRun, found_runs, load_results
-from yawbench.orchestrator.results.run_record import RUN_FILE
+from yawbench.orchestrator.results.run_record import RUN_FILE, RunRecord
 from yawbench.orchestrator.scenario import catalogue
+from yawbench.orchestrator.scenario.overrides import changed, with_changes
 from yawbench.reports.page_parts import Assets, Page, render, static
 from yawbench.reports.viewer import page
 
@@ -143,13 +148,76 @@ class ResultsServer(ThreadingHTTPServer):
         return "" if hmac.compare_digest(token.encode(), self.token.encode()) else self._paths.get(token)
 
 
+class ListedRun(NamedTuple):
+    """A run in the table of runs: peaks are texts with the number they are sorted by, None: not recorded."""
+
+    path: str
+    name: str  # within its folder
+    title: str
+    changed: str
+    peaks: Sequence[tuple[str, float] | None]
+    verdict: VerdictText | str  # whether the car was lost; "" if its events were not looked for
+    why: str
+    status: str
+    started: str
+
+
+PEAKS = {"sideslip": "rad", "yaw_rate": "rad/s", "acceleration_y": "m/s2"}
+"""Signals whose peak is listed, as far as the record of a run tells, with their units in SI."""
+
+
+def listed_run(path: str, run: FoundRun) -> ListedRun:
+    """Return a run as the table shows it, by its record alone: no signals are read."""
+    record = run.record
+    verdict: VerdictText | str = ""
+    reasons = why(record.events)
+    if "events" in record.model_fields_set:
+        verdict = LOST if reasons else HELD
+    return ListedRun(
+        path=path,
+        name=path.rpartition("/")[2],
+        title=with_changes(record.title or path, record.overrides),
+        changed=changed(record.overrides) if record.overrides else "",
+        peaks=[_peak(record, signal, unit) for signal, unit in PEAKS.items()],
+        verdict=verdict,
+        why="; ".join(map(str, reasons)),
+        status=run.status.value,
+        started=(record.started or "–")[:16].replace("T", " "),
+    )
+
+
+def _verdict(status: Status, words: str) -> VerdictText:
+    text = VerdictText(words)
+    text.status = status
+    return text
+
+
+HELD, LOST = _verdict(Status.PASSED, "held"), _verdict(Status.FAILED, "lost")
+"""Whether the car of a run was lost."""
+
+
+def _peak(record: RunRecord, signal: str, unit: str) -> tuple[str, float] | None:
+    """Return the largest absolute value of a signal of the first instance that has it."""
+    columns = (name for name in record.largest if name.rpartition(".")[2] == signal)
+    for column in columns:
+        if record.units.get(column) != unit:
+            continue
+        ends = [record.smallest.get(column), record.largest[column]]
+        numbers = [abs(end) for end in ends if isinstance(end, float)]
+        if len(numbers) == 2:
+            return shown(max(numbers), unit), max(numbers)
+    return None
+
+
 @dataclass(frozen=True, kw_only=True)
 class ResultsPage(Page):
     """The first page: paths and addresses of pages, paths of runs, names of scenarios for the bench."""
 
     template = "results.html.j2"
     pages: Sequence[tuple[str, str]]
-    runs: Sequence[tuple[str, FoundRun]]
+    groups: Mapping[str, Sequence[ListedRun]]  # folder -> its runs
+    peaks: Sequence[str]  # headings of the columns of peaks
+    count: int  # of all runs
     scenarios: Sequence[str]
 
 
@@ -241,10 +309,14 @@ class Request(BaseHTTPRequestHandler):
         """Send the list of pages and runs below the folder."""
         folder = self.server.folder
         pages = [(printable(path), f"files/{_quoted(path)}") for path in pages_below(folder)]
-        runs = list(runs_below(folder))
+        runs = [listed_run(path, run) for path, run in runs_below(folder)]
+        groups: dict[str, list[ListedRun]] = {}
+        for run in runs:
+            groups.setdefault(run.path.rpartition("/")[0], []).append(run)
         view = ResultsPage(
-            title=f"Results in {folder}", pages=pages, runs=runs, scenarios=catalogue.names("a scenario"),
-            assets=Assets(static("bench.css", __package__), ""),
+            title=f"Results in {folder}", pages=pages, groups=groups, count=len(runs),
+            peaks=[words(signal).lower() for signal in PEAKS], scenarios=catalogue.names("a scenario"),
+            assets=Assets(static("bench.css", __package__), static("results.js", __package__)),
         )  # fmt: skip
         self._send_own(render(view))
 

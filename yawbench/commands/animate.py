@@ -69,7 +69,8 @@ def write_view(
     """
     from yawbench.figures.display import LabelledRun
     from yawbench.foundation.safe_files import write_whole
-    from yawbench.reports.viewer import SETTINGS, Settings, View, page
+    from yawbench.reports.viewer import SETTINGS, Settings, page
+    from yawbench.reports.viewer_views import View
 
     read = read_runs(folders, start)
     runs = [LabelledRun(name, results) for name, results in zip(labels, read, strict=True)]

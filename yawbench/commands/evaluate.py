@@ -54,6 +54,8 @@ OutFile = Annotated[
 FILE, PAGE = "evaluation.json", "evaluation.html"
 DRIVE, EVALUATE = "drive", "evaluate"
 """Commands that write evaluations; neither replaces those of the other."""
+MOST_NOTES = 4
+"""Runs below a table of which it is said why they were lost. Chosen: a few lines each; the page has all."""
 BESIDE = "evaluated"
 """Folder of an evaluation below a folder that has one of another command already."""
 
@@ -128,8 +130,9 @@ class EvaluatedRuns:
             together: write figures into the folder instead of next to the results.
         """
         from yawbench.foundation.safe_files import write_whole
-        from yawbench.reports.evaluation_page import evaluation_page
+        from yawbench.reports.evaluation_page import evaluation_page, events_of_trace
         from yawbench.studies.driven_tests import run_table, runs_table
+        from yawbench.studies.tables import lost_notes
 
         drawn = self._draw(each=each, together=together)
         data = {
@@ -145,6 +148,8 @@ class EvaluatedRuns:
             table = run_table(self.judged[0], self.test.says)
         else:
             table = runs_table(self.series.runs if self.series else self.judged, self.test, self.series)
+        courses = [(trace.label, events_of_trace(trace)) for trace in self.traces]
+        table.notes += lost_notes(courses, MOST_NOTES, comparable=self.series is None)
         print_tables([table])
         page = evaluation_page(self.test, self.traces, self.judged, self.series)
         write_whole(self.folder / PAGE, page)

@@ -20,7 +20,7 @@ from .output import hold, print_tables, say, say_failed, stoppable, tabular
 if TYPE_CHECKING:
     from yawbench.figures.display import LabelledRun
     from yawbench.reports.study_page import StudyPage
-    from yawbench.reports.viewer import View
+    from yawbench.reports.viewer_views import View
     from yawbench.studies.dry_run import Forecast, Pace
     from yawbench.studies.executor import Executor
     from yawbench.studies.experiment import LoadedExperiment, PlannedExperiment

@@ -512,7 +512,11 @@ def events_in(results: Results) -> list[EventRecord]:
     """Return the events of a run: those of its record, else found in what was recorded."""
     if "events" in results.record.model_fields_set:
         return results.record.events
-    return _with_faults(events_of(results, (*WARNED, *EVENTS)), results)
+    known: dict[str, Any] = vars(results)  # kept there, as a cached property is: several tables ask
+    if "_events" not in known:
+        known["_events"] = _with_faults(events_of(results, (*WARNED, *EVENTS)), results)
+    found: list[EventRecord] = known["_events"]
+    return found
 
 
 def _with_faults(events: list[EventRecord], results: Results) -> list[EventRecord]:

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 from yawbench.orchestrator.results.run_record import EventRecord
 
@@ -32,6 +33,7 @@ class Reason:
 
     sentence: str
     event: EventRecord | None = None
+    beside: bool = False  # whether the event is one of the best run
 
     def __str__(self) -> str:
         return self.sentence
@@ -234,6 +236,31 @@ def why(events: Sequence[EventRecord], best: Sequence[EventRecord] | None = None
     return [*first, *middle, lost][:3]
 
 
+class Lost(NamedTuple):
+    """A run whose car was lost: its number, why, and the number of the run that did best beside it."""
+
+    run: int
+    reasons: list[Reason]
+    best: int | None
+
+
+def lost_among(runs: Sequence[Sequence[EventRecord]], *, comparable: bool = True) -> list[Lost]:
+    """Return the runs, of several given by their events, whose cars were lost, and why.
+
+    Args:
+        runs: their events.
+        comparable: whether they are runs under the same conditions; then the one that turned aside least of
+            those that were not lost stands beside.
+    """
+    held = [number for number, events in enumerate(runs) if comparable and not lost(events)]
+    best = min(held, key=lambda number: furthest_aside(runs[number]), default=None)
+    found = (
+        Lost(number, why(events, None if best is None else runs[best]), best)
+        for number, events in enumerate(runs)
+    )
+    return [one for one in found if one.reasons]
+
+
 def lost(events: Sequence[EventRecord]) -> bool:
     """Return whether a car was lost."""
     return any(event.kind in LOSSES for event in events)
@@ -251,12 +278,12 @@ def _beside(course: Course, best: Sequence[EventRecord]) -> Iterator[Reason]:
     if other is None:
         return
     if own is None:
-        yield Reason(f"the best controller acts from {_at(other)}", other)
+        yield Reason(f"the best controller acts from {_at(other)}", other, beside=True)
         return
     earlier = own.time - other.time
     if abs(earlier) >= 0.01:
         when = f"{abs(earlier):.2f} s {'earlier' if earlier > 0 else 'later'}"
-        yield Reason(f"the best controller begins to act {when}, at {_at(other)}", other)
+        yield Reason(f"the best controller begins to act {when}, at {_at(other)}", other, beside=True)
     else:
         strongest = max((e.value or 0.0 for e in best if e.kind == "intervention"), default=0.0)
         mine = max((e.value or 0.0 for e in course.of("intervention")), default=0.0)
@@ -266,6 +293,7 @@ def _beside(course: Course, best: Sequence[EventRecord]) -> Iterator[Reason]:
                 f"the best controller begins at the same time, but asks for up to {_value(strongest, unit)} "
                 f"instead of {_value(mine, unit)}",
                 other,
+                beside=True,
             )
 
 
@@ -287,15 +315,17 @@ def _place(event: EventRecord) -> str:
     return f"{where}{KINDS[event.kind].words}"
 
 
-def sentence(event: EventRecord) -> str:
-    """Return an event in words: place, what happens, from when to when, how far."""
+def label_of(event: EventRecord) -> str:
+    """Return where an event happens, and what."""
     if event.kind == "fault":
-        words = f"fault: {event.where}"
-    else:
-        words = _place(event) if event.kind in KINDS else f"{event.where} {event.kind}".strip()
-    until = "" if event.until is None else f" to {event.until:.2f} s"
-    far = "" if event.value is None else f": {_value(event.value, event.unit)}"
-    return f"{words} from {_at(event)}{until}{far}"
+        return f"fault: {event.where}"
+    words = KINDS[event.kind].words if event.kind in KINDS else event.kind
+    return f"{event.where} {words}".strip()
+
+
+def far_of(event: EventRecord, unit: str) -> str:
+    """Return how far an event goes, in a unit; "" if it tells no value."""
+    return _value(event.value, unit)
 
 
 def _at(event: EventRecord) -> str:

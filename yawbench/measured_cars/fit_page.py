@@ -17,7 +17,8 @@ from yawbench.metrics.expressions import MetricValue
 from yawbench.orchestrator.results.reader import Results
 from yawbench.reports.evaluation_page import drawn
 from yawbench.reports.page_parts import Document, render
-from yawbench.reports.viewer import LARGEST, Settings, View, assets, viewer
+from yawbench.reports.viewer import LARGEST, Settings, assets, viewer
+from yawbench.reports.viewer_views import View
 from yawbench.studies.tables import Table
 from yawbench.vocabulary.signals import SIGNALS
 

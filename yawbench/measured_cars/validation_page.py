@@ -16,7 +16,8 @@ from yawbench.metrics.verdict import SYMBOLS, apart, worded
 from yawbench.orchestrator.results.reader import Results
 from yawbench.reports.evaluation_page import drawn
 from yawbench.reports.page_parts import Document, render
-from yawbench.reports.viewer import LARGEST, Settings, View, assets, viewer
+from yawbench.reports.viewer import LARGEST, Settings, assets, viewer
+from yawbench.reports.viewer_views import Bound, View
 from yawbench.studies.tables import Table
 
 
@@ -104,5 +105,5 @@ def _cross_plots(validation: Validation) -> tuple[list[LabelledRun], Settings]:
         views.append(
             View(f"{words(plot.signal)} over time", [signal, over, distance], range(first, len(runs) - 1))
         )
-    limits = [(f"{plot.signal}.{DISTANCE}", 1.0, "tolerance") for plot in validation.plots]
+    limits = [Bound(f"{plot.signal}.{DISTANCE}", 1.0, "tolerance") for plot in validation.plots]
     return runs, Settings(views, metrics=(), limits=limits, bands=bands, largest=LARGEST)

@@ -80,7 +80,7 @@ def rank(
 
     from .ranking import load_ranking
     from .ranking_page import beside_matrix
-    from .ranking_tables import columns_of_entries, table_of
+    from .ranking_tables import columns_of_entries, lost_cells, table_of
     from .whole import run_whole
 
     more = dict(map(_entry, controller or ()))
@@ -104,7 +104,9 @@ def rank(
         command = command_of("rank", file, quick=quick, controller=controller, condition=condition)
         _write(ranked, folder, command, pooled(context, options))
     output.answer(folder=folder, page=folder / PAGE, entries=records_in(columns_of_entries(ranked)))
-    print_tables([table_of(ranked, "gains", "speed lost", "chatter"), *beside_matrix(ranked)])
+    table = table_of(ranked, "gains", "speed lost", "chatter")
+    table.notes += lost_cells(ranked)
+    print_tables([table, *beside_matrix(ranked)])
     if unranked := [score.entry for score in ranked.scores if score.missing]:
         say(f"not ranked (missing runs): {', '.join(unranked)}")
 

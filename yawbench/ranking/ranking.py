@@ -223,6 +223,11 @@ RECORDED = (
     "steer_angle*",
 )  # fmt: skip
 """The recorded signals: those of the test, the metrics and the car on the road; others would take space."""
+OF_EVENTS = (
+    "tyre_force_x*", "tyre_force_y*", "vertical_load*", "slip_ratio*", "friction*", "force_request*",
+    "brake_pressure*", "wind_force_y*", "roll_angle*", "fault*",
+)  # fmt: skip
+"""Further signals, of the runs that the page shows: their events tell why a car was lost."""
 
 
 @dataclass(frozen=True)

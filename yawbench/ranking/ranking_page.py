@@ -22,7 +22,8 @@ from yawbench.orchestrator.scenario.overrides import changed
 from yawbench.proving_ground.sine_with_dwell import RATIOS, SPUN, course_of
 from yawbench.proving_ground.trace import trace_of
 from yawbench.reports.page_parts import FigureImage, Page, Part, anchor, image_of, option_of, render
-from yawbench.reports.viewer import DATA, Settings, View, assets, carried, embedded, tidy_sides, write_side
+from yawbench.reports.viewer import DATA, LEAST, Settings, assets, carried, embedded, tidy_sides, write_side
+from yawbench.reports.viewer_views import Bound, Mark, View
 from yawbench.studies.experiment import FIGURES
 from yawbench.studies.experiment_result import Each
 from yawbench.studies.jobs import STEP_TIME
@@ -39,6 +40,7 @@ from .ranking_scores import (
     RankingCell,
     RankingResult,
     apart_by_conditions,
+    best_beside,
     deciding_digits,
 )
 from .ranking_tables import (
@@ -49,6 +51,7 @@ from .ranking_tables import (
     interval_words,
     place_words,
     row_of,
+    run_label,
     runs_table,
     share_text,
     sign_of,
@@ -301,7 +304,7 @@ def _id(cell: RankingCell) -> str:
 
 def _side(
     ranked: RankingResult, score: EntryScore, cell: RankingCell, folder: Path
-) -> tuple[str, str, Path | None, str, Path]:
+) -> tuple[str, Sequence[tuple[str, Path]], str, Path]:
     """Return the arguments of `_write_side` for a cell."""
     condition, worst = ranked.ranking.conditions[cell.condition], cell.worst
     sums = {
@@ -312,10 +315,11 @@ def _side(
         **{key.replace("_", " "): _text(cell.number(key), UNITS[key]) for key in OTHERS},
         "time per step": _text(cell.number(STEP_TIME), "s"),
     }
-    label = (
-        f"{score.spec.title}, {'right' if worst.amplitude < 0 else 'left'} first, {degrees(worst.amplitude)}"
-    )
-    shows = worst.results is not None and worst.results.is_dir()
+    label = run_label(ranked, worst)
+    runs = [(label, worst.results)] if worst.results is not None and worst.results.is_dir() else []
+    best = best_beside(ranked.scores, cell)
+    if runs and best and best.results is not None and best.results.is_dir():
+        runs.append((run_label(ranked, best), best.results))
     details = CellPart(
         title=f"{score.spec.title}: {condition.title}",
         state=cell.state.value,
@@ -325,32 +329,33 @@ def _side(
         table=runs_table(cell),
         command=series_command(ranked, cell),
         again=again_command(ranked, cell, folder),
-        worst=f"Its worst run: {label}, {state_words(worst)}." if shows else "Its runs kept no results.",
+        worst=f"Its worst run: {label}, {state_words(worst)}." if runs else "Its runs kept no results.",
     )
-    return _id(cell), label, worst.results if shows else None, render(details), folder
+    return _id(cell), runs, render(details), folder
 
 
-def _write_side(key: str, label: str, results: Path | None, html: str, folder: Path) -> None:
+def _write_side(key: str, runs: Sequence[tuple[str, Path]], html: str, folder: Path) -> None:
     """Write the side file of a cell; without results, or unreadable ones, it has no run."""
     content = None
-    if results is not None:
+    if runs:
         with suppress(ResultsError):
-            run = load_results(results)
-            limits = [("sideslip", side * SPUN, "20° of sideslip") for side in (1.0, -1.0)]
-            settings = Settings(
-                [View(panels=SHOWN)], marks=_instants(run), limits=limits, dashed_of=0, largest=1
+            loaded = [LabelledRun(label, load_results(results)) for label, results in runs]
+            limits = [Bound("sideslip", side * SPUN, "20° of sideslip") for side in (1.0, -1.0)]
+            marks = _instants(loaded[0].results)
+            content = carried(
+                loaded, Settings([View(panels=SHOWN)], marks=marks, limits=limits, largest=LEAST)
             )
-            content = carried([LabelledRun(label, run)], settings)
     write_side(folder, key, content, html=html)
 
 
-def _instants(run: Results) -> list[tuple[float, str]]:
+def _instants(run: Results) -> list[Mark]:
     """Return the instants of the test: completion of steer, and those at which the yaw rate is judged."""
     try:
         course = course_of(trace_of(run, SERIES))
     except (NotJudged, ResultsError):
         return []
-    return [(course.end, "COS"), *((course.end + late, f"COS + {late:g} s") for late, _ in RATIOS)]
+    instants = [(0.0, "COS"), *((late, f"COS + {late:g} s") for late, _ in RATIOS)]
+    return [Mark(course.end + late, text, 0) for late, text in instants]
 
 
 def _text(number: float | None, unit: str) -> str | None:

@@ -44,6 +44,7 @@ from yawbench.studies.jobs import STEP_TIME, Job, MeasuredRun
 
 from .ranking import (
     CONTROLLER,
+    OF_EVENTS,
     RECORDED,
     EntrySpec,
     LoadedRanking,
@@ -397,11 +398,30 @@ def run_ranking(
     runs = _ranked_runs(ranking, angles, result)
     scores = scores_of(ranking, runs)
     if keep:
-        worst = {id(cell.worst) for score in scores for cell in score.cells.values()}
-        kept = [number for number, run in enumerate(runs) if id(run) in worst and run.record is not None]
-        runs = _ranked_runs(ranking, angles, execute.keeping(result, kept))
+        cells = [cell for score in scores for cell in score.cells.values()]
+        shown = {id(run) for cell in cells for run in (cell.worst, best_beside(scores, cell))}
+        kept = [number for number, run in enumerate(runs) if id(run) in shown and run.record is not None]
+        runs = _ranked_runs(ranking, angles, execute.keeping(result, kept, OF_EVENTS))
         scores = scores_of(ranking, runs)
     return RankingResult(ranking, angles, runs, scores)
+
+
+def best_beside(scores: Sequence[EntryScore], cell: RankingCell) -> RankedRun | None:
+    """Return the run of the best entry that passes at the amplitude of a cell's worst run; None without one.
+
+    None also where that run passes itself.
+    """
+    worst = cell.worst
+    if worst.passed:
+        return None
+    others = (score.cells[cell.condition].runs for score in scores if cell.condition in score.cells)
+    alike = (
+        run
+        for runs in others
+        for run in runs
+        if (run.amplitude, run.repeat) == (worst.amplitude, worst.repeat)
+    )
+    return next((run for run in alike if run.passed), None)
 
 
 def _ranked_runs(

@@ -11,11 +11,21 @@ import numpy as np
 from yawbench.figures.display import digits_of, shown
 from yawbench.foundation.messages import counted
 from yawbench.metrics.expressions import MetricValue
+from yawbench.orchestrator.results.run_folder import load_record
+from yawbench.orchestrator.results.run_record import RUN_FILE
 from yawbench.proving_ground.sine_with_dwell import percent
 from yawbench.studies.jobs import STEP_TIME
-from yawbench.studies.tables import Cell, Column, Table, column
+from yawbench.studies.tables import Cell, Column, Table, column, lost_notes
 
-from .ranking_scores import Digits, EntryScore, RankedRun, RankedState, RankingCell, deciding_digits
+from .ranking_scores import (
+    Digits,
+    EntryScore,
+    RankedRun,
+    RankedState,
+    RankingCell,
+    best_beside,
+    deciding_digits,
+)
 
 if TYPE_CHECKING:
     from yawbench.studies.confidence import ConfidenceInterval, ToldApart
@@ -78,6 +88,34 @@ def apart_sentence(apart: ToldApart, idle: Sequence[bool]) -> str:
 def degrees(amplitude: float) -> str:
     """Return an amplitude in degrees, to a tenth."""
     return f"{math.degrees(abs(amplitude)):.1f}°"
+
+
+def run_label(ranked: RankingResult, run: RankedRun) -> str:
+    """Return the label of a run: its entry, side and amplitude."""
+    title = next(score.spec.title for score in ranked.scores if score.entry == run.entry)
+    return f"{title}, {'right' if run.amplitude < 0 else 'left'} first, {degrees(run.amplitude)}"
+
+
+MOST_NOTES = 4
+"""Cells of which a note says why the car was lost. Chosen: a few lines each; the page has all."""
+
+
+def lost_cells(ranked: RankingResult) -> list[str]:
+    """Return why cars were lost in the worst runs of cells, beside the best run, as their records tell."""
+    notes = []
+    for cell in (cell for score in ranked.scores for cell in score.cells.values()):
+        shown = [run for run in (cell.worst, best_beside(ranked.scores, cell)) if run]
+        courses = [
+            (run_label(ranked, run), load_record(run.results).events)
+            for run in shown
+            if run.results is not None and (run.results / RUN_FILE).is_file()
+        ]
+        if courses and not cell.worst.passed:
+            title = ranked.ranking.conditions[cell.condition].title
+            notes += [f"{title}: {note}" for note in lost_notes(courses) if note.startswith(courses[0][0])]
+    return notes[:MOST_NOTES] + [f"{len(notes) - MOST_NOTES} more cells: see the page"] * (
+        len(notes) > MOST_NOTES
+    )
 
 
 RULE = (

@@ -13,7 +13,7 @@ from yawbench.studies.experiment_result import ExperimentResult
 from yawbench.studies.tables import Table, marked, remarks
 
 from .divergence import SAME, SEEN, RunComparison, divergence, parting_summary, partings_table
-from .viewer import View
+from .viewer_views import View
 
 MOST_DIFFERENT = 6
 """Number of most different signals drawn; chosen: three rows of two panels fill a screen."""

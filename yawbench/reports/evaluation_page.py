@@ -14,12 +14,14 @@ from pathlib import Path
 
 import numpy as np
 
+from yawbench.events.kinds import events_in
 from yawbench.figures.display import LabelledRun, digits_apart, shown
 from yawbench.foundation.messages import counted
 from yawbench.metrics.measures import words
 from yawbench.metrics.verdict import SYMBOLS, Status, Verdict, worded, worst
 from yawbench.orchestrator.results.reader import Results, load_results
-from yawbench.orchestrator.results.run_record import RunRecord
+from yawbench.orchestrator.results.run_folder import load_record
+from yawbench.orchestrator.results.run_record import EventRecord, RunRecord
 from yawbench.proving_ground.standard_tests import Evaluation, Limit, StandardTest, TestSeries
 from yawbench.proving_ground.trace import Trace
 from yawbench.studies.driven_tests import run_table, runs_table
@@ -28,7 +30,8 @@ from yawbench.studies.tables import Table
 from yawbench.vocabulary.signals import SIGNALS
 
 from .page_parts import Document, render
-from .viewer import LARGEST, MOST, Settings, View, assets, viewer
+from .viewer import LARGEST, MOST, Settings, assets, viewer
+from .viewer_views import Bound, Mark, View
 
 PANELS = ("steering_wheel_angle", "yaw_rate", "sideslip", "acceleration_y", "cone_overrun")
 """Signals shown first, where they are recorded; chosen: what most tests judge."""
@@ -87,22 +90,25 @@ def evaluation_page(
     labels = [trace.label for trace in traces]
     deciding = [labels.index(label) for label in decide] or [0]
     chosen = judged[deciding[0]]
-    marks, limits = test.marks(chosen)
+    dashed = [test.marks(run) for run in judged[:MOST]]
+    marks = [Mark(*mark, number) for number, (own, _) in enumerate(dashed) for mark in own]
+    limits = [Bound(*limit, number) for number, (_, own) in enumerate(dashed) for limit in own]
     shown_first = sorted(set(deciding))[:MOST]
     views = [View("the runs that decide", PANELS, shown_first)]
     if len(traces) > len(shown_first):
         views.append(View("all runs", PANELS))
     every = [runs_table(series.runs if series else judged, test, series)] if len(judged) > 1 else []
     runs = [LabelledRun(label, results_of(trace)) for label, trace in zip(labels, traces, strict=True)][:MOST]
-    settings = Settings(views, marks=marks, limits=limits, dashed_of=deciding[0], largest=LARGEST)
-    dashed = [*(f"{instant:.3f} s: {text}" for instant, text in marks), *map(_limit_words, limits)]
+    settings = Settings(views, marks=marks, limits=limits, largest=LARGEST, comparable=series is None)
+    instants, bounds = dashed[deciding[0]]
+    told = [*(f"{instant:.3f} s: {text}" for instant, text in instants), *map(_limit_words, bounds)]
     view = Document(
         title=f"{test.name.replace('-', ' ').capitalize()}: {counted(len(judged), 'run')}",
         below=f"{test.says[:1].upper()}{test.says[1:]}.",
         sentence=series.summary if series else _sentence(criteria, judged),
         first=[criteria] if criteria.rows else [],
         viewer=viewer(runs, settings, name="test", alone=True),
-        notes=[f"Dashed, of {chosen.label}: {'; '.join(dashed)}."] if dashed else [],
+        notes=[f"Dashed, of {chosen.label}: {'; '.join(told)}."] if told else [],
         sections=[
             *([("All runs", every)] if every else []),
             ("Quantities", [run_table(run, test.says) for run in judged]),
@@ -133,6 +139,13 @@ def results_of(trace: Trace) -> Results:
     if trace.folder is not None:
         return load_results(trace.folder)
     return drawn(Results, trace.time, trace.signals)
+
+
+def events_of_trace(trace: Trace) -> Sequence[EventRecord]:
+    """Return the events of a trace: those of its record, for which no signals are read, else found."""
+    if trace.folder is not None and "events" in (record := load_record(trace.folder)).model_fields_set:
+        return record.events
+    return events_in(results_of(trace))
 
 
 def drawn(kind: type[Results], time: np.ndarray, columns: Mapping[str, np.ndarray]) -> Results:

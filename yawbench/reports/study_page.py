@@ -5,21 +5,24 @@ It has the verdicts, runs, system, tables and parameters of the experiment, and 
 
 from __future__ import annotations
 
+import json
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
+from urllib.parse import quote
 
 from markupsafe import Markup
 
-from yawbench.figures.display import LabelledRun
+from yawbench.figures.display import LabelledRun, shown
 from yawbench.figures.phase_portrait import signals_of
 from yawbench.foundation.errors import ResultsError
 from yawbench.foundation.messages import counted, listed
 from yawbench.measurements.measured_results import filtered_alike
-from yawbench.metrics.expressions import evaluate, metric
+from yawbench.metrics.expressions import columns_of, evaluate, metric, reference_of
+from yawbench.metrics.verdict import SYMBOLS
 from yawbench.orchestrator.plan import Plan
 from yawbench.orchestrator.results.reader import Results
 from yawbench.orchestrator.results.record_of_plan import run_record
@@ -28,9 +31,9 @@ from yawbench.orchestrator.results.run_record import RunRecord, RunStatus
 from yawbench.orchestrator.scenario.loader import LoadedScenario
 from yawbench.orchestrator.scenario.overrides import changed
 from yawbench.planner import Planner
-from yawbench.studies.claims import ClaimResult
+from yawbench.studies.claims import ClaimResult, Comparison, OpenValueScan
 from yawbench.studies.confidence import CONFIDENCE
-from yawbench.studies.experiment import FIGURES, LoadedExperiment
+from yawbench.studies.experiment import FIGURES
 from yawbench.studies.experiment_result import Each, ExperimentResult
 from yawbench.studies.jobs import Job
 from yawbench.studies.open_value_regions import runs_of as runs_of_claim
@@ -58,18 +61,8 @@ from .diagram import diagram, systems_of
 from .page_parts import Document, FigureImage, Page, anchor, image_of
 from .provenance import ParameterGroup, count_kinds, fmus_of, groups_of, programs_of
 from .sweep_view import SWEEP_ASSETS, sweep_sentence, sweep_view, write_sides
-from .viewer import (
-    LARGEST,
-    MOST,
-    PANELS,
-    Carried,
-    Settings,
-    View,
-    answer_of,
-    assets,
-    carried,
-    embedded,
-)
+from .viewer import LARGEST, MOST, Carried, Settings, answer_of, assets, carried, embedded
+from .viewer_views import PANELS, View
 
 
 @dataclass(frozen=True)
@@ -93,6 +86,7 @@ class JudgedClaim:
     agreeing: float | None
     robust: bool  # whether less than a tenth of the region flips the verdict
     lines: Table | None  # values along the lines of the region
+    strip: Markup  # the same drawn: the margin at each level of each open value; "" without a region
     link: str  # state of the viewer that shows the claim's runs; "" if it has none of them
 
 
@@ -204,8 +198,8 @@ def chapter(
         counts=counts_of(findings.claims),
         reach=reach(findings),
         answer=" ".join(filter(None, (answer(findings), sweep and sweep_sentence(findings)))),
-        claims=[judged(result, link_to_runs(experiment, result, numbers)) for result in findings.claims],
-        checks=[judged(result, link_to_runs(experiment, result, numbers)) for result in findings.checks],
+        claims=[judged(result, link_to_runs(findings, result, numbers)) for result in findings.claims],
+        checks=[judged(result, link_to_runs(findings, result, numbers)) for result in findings.checks],
         region=region_table(findings) if findings.regions else None,
         limits=limit_tables(findings),
         systems=systems(plans, spec.title),
@@ -234,16 +228,55 @@ def chapter(
     )
 
 
-def link_to_runs(experiment: LoadedExperiment, result: ClaimResult, numbers: Mapping[str, int]) -> str:
+def link_to_runs(findings: ExperimentResult, result: ClaimResult, numbers: Mapping[str, int]) -> str:
     """Return the state of the viewer that shows a claim's runs; "" if it has none of them.
 
+    The run that decides is the baseline; the signal that decides is highlighted, with its bound if that is
+    one of the signal's values.
+
     Args:
-        experiment: of the claim.
+        findings: the experiment and its results.
         result: the judged claim.
         numbers: run -> its number in the viewer.
     """
-    shown = [numbers[run] for run in runs_of_claim(experiment, result.claim) if run in numbers]
-    return f"{VIEW}?shown={shown}&baseline={shown[0]}".replace(" ", "") if shown else ""
+    runs = [numbers[run] for run in runs_of_claim(findings.experiment, result.claim) if run in numbers]
+    if not runs:
+        return ""
+    first, lit = runs[0], ""
+    judged = [
+        (verdict.margin, comparison, one.run)
+        for comparison in result.compared
+        for verdict, one in zip(comparison.verdicts, comparison.measured, strict=False)
+        if verdict.margin is not None and one.run in numbers
+    ]
+    if judged:
+        _, comparison, run = min(judged, key=lambda item: item[0])
+        first = numbers[run]
+        if highlighted := _highlighted(findings, comparison, findings.results[run]):
+            lit = f"&lit={quote(json.dumps(highlighted, ensure_ascii=False, separators=(',', ':')))}"
+    return f"{VIEW}?shown={runs}&baseline={first}".replace(" ", "") + lit
+
+
+def _highlighted(findings: ExperimentResult, comparison: Comparison, run: Results) -> list[Any] | None:
+    """Return the signal of a condition's metric, as a panel names it, its bound on it or None, and a text."""
+    spec = findings.spec.metrics.get(comparison.condition.metric)
+    chosen = metric(spec.metric) if spec else None
+    columns = columns_of(run, chosen.signal) if chosen else []
+    if chosen is None or not columns or comparison.bound is None:
+        return None
+    signal, bound = columns[0], comparison.bound
+    if chosen.other or chosen.measure.needs_reference:
+        others = columns_of(run, chosen.other) if chosen.other else [reference_of(run, signal) or ""]
+        if not others or not others[0]:
+            return None
+        signal = f"{signal} - {others[0]}"
+    relation = comparison.condition.relation
+    text = f"{chosen.title} {SYMBOLS[relation]} {shown(bound, comparison.unit)}"
+    return [signal, bound if chosen.name.partition("(")[0] in ON_SIGNAL else None, text]
+
+
+ON_SIGNAL = ("peak", "peak_error", "final", "value")
+"""Measures whose value is one of their signal."""
 
 
 def runs_made(findings: ExperimentResult) -> Sequence[tuple[Results | Plan, int]]:
@@ -329,7 +362,53 @@ def judged(result: ClaimResult, link: str) -> JudgedClaim:
         agreeing=100 * result.region.agreeing if result.region else None,
         robust=result.region is not None and result.region.robust,
         lines=line_table(result) if result.region else None,
+        strip=margin_strip(result.region.lines) if result.region else Markup(""),
         link=link,
+    )
+
+
+STRIP = (150, 360, 16)
+"""Where the margins of a strip begin and end, and the height of an open value [pixels]."""
+LABEL = 24
+"""Characters of an open value that have room in the strip."""
+
+
+def margin_strip(scans: Sequence[OpenValueScan]) -> Markup:
+    """Return the margins at the levels of each open value as a drawing, a line each: the verdict flips at 0.
+
+    Margins beyond 100 % are drawn at the end of their side; the chosen value has a ring.
+    """
+    begin, end, high = STRIP
+    middle, half = (begin + end) / 2, (end - begin) / 2 - 8
+    dots: dict[str, list[str]] = {"good": [], "bad": [], "ring": []}
+    texts, axes = [], []
+    for row, scan in enumerate(scans):
+        y = high * row + 10
+        label = scan.says if len(scan.says) <= LABEL else f"{scan.says[: LABEL - 1]}…"
+        texts.append(Markup('<text x="0" y="{}">{}</text>').format(y + 4, label))
+        axes.append(f"M{begin} {y}H{end}")
+        for level in (scan.chosen, *scan.levels):
+            margin = level.verdict.margin
+            if margin is None:
+                continue
+            x, radius = middle + half * max(-1.0, min(1.0, margin)), 5 if level is scan.chosen else 3
+            arc = f"a{radius} {radius} 0 1 0"
+            circle = f"M{x - radius:.1f} {y}{arc} {2 * radius} 0{arc} {-2 * radius} 0"
+            dots["ring" if level is scan.chosen else "good" if level.verdict.holds else "bad"].append(circle)
+    bottom = high * len(scans) + 4
+    ends = [(begin, "start", "−100 %"), (middle, "middle", "flips"), (end, "end", "100 %")]
+    texts += [
+        Markup('<text x="{}" y="{}" text-anchor="{}">{}</text>').format(x, bottom + 12, anchored, words)
+        for x, anchored, words in ends
+    ]
+    paths = [f'<path class="axis" d="{"".join(axes)}M{middle} 2V{bottom}"/>']
+    paths += [f'<path class="{kind}" d="{"".join(circles)}"/>' for kind, circles in dots.items() if circles]
+    drawing = Markup("".join(paths)) + Markup("").join(texts)
+    says = (
+        "The margin at each level of each open value; the ring is the chosen one. The table has the numbers."
+    )
+    return Markup('<svg class="strip" viewBox="0 0 {} {}" role="img" aria-label="{}">{}</svg>').format(
+        end + 2, bottom + 16, says, drawing
     )
 
 

@@ -33,7 +33,8 @@ from yawbench.studies.jobs import NOT_MADE, Job
 from yawbench.studies.limits import Limit, limits_of
 
 from .page_parts import Part, option_of, render
-from .viewer import DATA, METRICS, PANELS, Settings, View, carried, embedded, tidy_sides, write_side
+from .viewer import DATA, LEAST, METRICS, Settings, carried, embedded, tidy_sides, write_side
+from .viewer_views import PANELS, Bound, View
 
 SWEEP_ASSETS = ("sweep.js", "sweep.css")
 """Script and style sheet of the view."""
@@ -312,9 +313,9 @@ def side_settings(findings: ExperimentResult) -> Settings:
         bounded = metrics[key]
         if bounded.name.startswith("peak(") and not bounded.other:
             level = limit["bound"] / shown_unit(findings.unit(key))[1]
-            limits += [(bounded.signal, side * level, "limit") for side in (1.0, -1.0)]
+            limits += [Bound(bounded.signal, side * level, "limit") for side in (1.0, -1.0)]
     names = [spec.metric for spec in findings.spec.metrics.values()][:MOST_METRICS] or METRICS
-    return Settings([View(panels=panels)], names, limits=limits, largest=1)
+    return Settings([View(panels=panels)], names, limits=limits, largest=LEAST)
 
 
 def _write_side(job: Job, label: str, settings: Settings, folder: Path) -> bool:

@@ -8,6 +8,7 @@ installed package `uplot-python`.
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import accumulate, pairwise
@@ -17,6 +18,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from markupsafe import Markup
 
+from yawbench.events.kinds import events_in
+from yawbench.events.why import Reason, far_of, label_of, lost_among
 from yawbench.figures.display import LabelledRun, digits_apart, shown, shown_unit, unit_of_signal
 from yawbench.figures.plots import changes_of, spans_of
 from yawbench.figures.style import LINES, MEASURED_LINE, line_style
@@ -24,27 +27,35 @@ from yawbench.foundation.errors import ResultsError
 from yawbench.foundation.messages import listed
 from yawbench.foundation.safe_files import write_whole
 from yawbench.measurements.measured_results import MeasuredResults
-from yawbench.metrics.expressions import MetricValue, columns_of, evaluate, metric, reference_of, while_moving
+from yawbench.metrics.expressions import (
+    Metric,
+    MetricValue,
+    columns_of,
+    evaluate,
+    metric,
+    reference_of,
+    while_moving,
+)
 from yawbench.metrics.measures import words
 from yawbench.orchestrator.results.reader import Results
 from yawbench.orchestrator.results.run_record import RunStatus
 from yawbench.orchestrator.scenario.overrides import with_changes
 
 from .page_parts import Assets, Document, Part, render, static, without_comments
+from .planes import planes_of
 from .road import legend_of, notes_of, road_of, without_tyres
 from .viewer_data import PackedRun, is_numeric, pack
+from .viewer_views import Bound, Mark, View
 
 SCRIPTS = (
-    "viewer_data.js", "viewer_panels.js", "viewer_draw.js", "viewer_scene.js", "viewer_close_up.js",
-    "viewer_road.js", "viewer.js", "viewer_side.js",
+    "viewer_data.js", "viewer_panels.js", "viewer_draw.js", "viewer_picture.js", "viewer_events.js",
+    "viewer_scene.js", "viewer_close_up.js", "viewer_road.js", "viewer.js", "viewer_side.js",
 )  # fmt: skip
 SHEETS = ("uPlot.min.css", "viewer.css")
 MOST = 200
 """Largest number of runs in one viewer. Chosen: beyond the runs of any study; colours repeat after seven."""
 FIRST = 14
 """Largest number of runs shown at first, where none are chosen. Chosen: two of each of seven colours."""
-PANELS = ("sideslip", "yaw_rate", "acceleration_y", "yaw_moment", "steer_angle")
-"""Signals shown first, with their references; chosen: what all four papers draw."""
 METRICS = ("peak(sideslip)", "peak(yaw_rate)", "peak(acceleration_y)", "peak(yaw_moment)")
 """Metrics in the table of runs, by default."""
 FEW = 4
@@ -52,26 +63,10 @@ FEW = 4
 LARGEST = 2_200_000
 """Size of the samples in a page [bytes]. Chosen: with its text a page of 2.5 MB, which opens at once, also by
 mail."""
+LEAST = 1
+"""Size of the samples of runs in files of their own: the signals of views and road alone, without planes."""
 STILL = ("sideslip", "yaw_rate")
 """Signals whose largest value sets the cursor at first."""
-
-
-@dataclass(frozen=True)
-class View:
-    """A selection of runs and signals that the reader can choose.
-
-    Attributes:
-        title: of the choice.
-        panels: signals, `instance.variable` or the variable alone, `x_error` for its error, `x - y`; a comma
-            overlays further ones.
-        shown: numbers of the runs; None: all, up to `FIRST`.
-        x: signal on the horizontal axis, or time.
-    """
-
-    title: str = ""
-    panels: Sequence[str] = PANELS
-    shown: Sequence[int] | None = None
-    x: str = "time"
 
 
 @dataclass(frozen=True)
@@ -81,23 +76,23 @@ class Settings:
     Attributes:
         views: to choose from; the first is shown at first.
         metrics: those in the table of runs.
-        marks: instants [s] with a text, as vertical lines.
-        limits: signal, bound in SI units and a text, as horizontal lines.
-        dashed_of: number of the run that marks and limits belong to, with which they are hidden; None: all.
+        marks, limits: dashed lines; those of a run are hidden with it.
         largest: size of the samples [bytes]; beyond it, the page carries the signals of the views and of the
             road alone, and still beyond it, of the road without the forces of the tyres. 0: no limit.
         ghosts: numbers of runs that are drawn faintly behind the others.
         bands: numbers of runs whose closed line is filled, behind all others; not over time.
+        comparable: whether the runs are under the same conditions, so that the best of them stands beside one
+            that was lost.
     """
 
     views: Sequence[View] = (View(),)
     metrics: Sequence[str] = METRICS
-    marks: Sequence[tuple[float, str]] = ()
-    limits: Sequence[tuple[str, float, str]] = ()
-    dashed_of: int | None = None
+    marks: Sequence[Mark] = ()
+    limits: Sequence[Bound] = ()
     largest: int = 0
     ghosts: Sequence[int] = ()
     bands: Sequence[int] = ()
+    comparable: bool = True
 
 
 SETTINGS = Settings()
@@ -192,7 +187,8 @@ def carried(
     results = [run.results for run in runs]
     grounds: list[Any] = []
     roads = [road_of(run.results, grounds) for run in runs]
-    drawn = [_drawn(view, results) for view in settings.views]
+    planes, curves = ([], []) if settings.largest == LEAST else planes_of(results)
+    drawn = [_drawn(view, results) for view in (*settings.views, *planes)]
     views = [view for view in drawn if view["panels"]] or drawn[:1]
     packed = packed or pack(results)
     notes = [notes_of(run.results, road) for run, road in zip(runs, roads, strict=True)]
@@ -208,12 +204,23 @@ def carried(
         "grounds": grounds,
         "still": still_of(results),
         "limits": [
-            [column, bound, text]
-            for signal, bound, text in settings.limits
+            [column, bound, text, run]
+            for signal, bound, text, run in settings.limits
             for column in _columns(results, signal)
         ],
         "marks": [list(mark) for mark in settings.marks],
-        "dashed_of": settings.dashed_of,
+        "curves": [
+            [x, y, text, [*xs], [*ys], run]
+            for x_name, y_name, text, xs, ys, run in curves
+            for x, y in zip(_columns(results, x_name), _panels(results, y_name), strict=False)
+            for y in [y.partition(",")[0]]
+        ],
+        "why": [
+            [number, [_sentence(reason, number, best, reasons[-1]) for reason in reasons], best]
+            for number, reasons, best in lost_among(
+                [*map(events_in, results)], comparable=settings.comparable
+            )
+        ],
         "signals": {name: signal for name, signal in _signals(results).items() if name in carried},
         "dashes": [_dash(number) for number in range(len(LINES))],
         "metrics": [
@@ -226,6 +233,8 @@ def carried(
                 "label": run.label,
                 "faults": [[span.begin, span.end, span.label] for span in spans_of([run])],
                 "notes": notes[number],
+                "events": _events(run.results),
+                "folder": str(run.results.folder) if run.results.folder != Path() else "",
                 "road": road,
                 "ghost": number in settings.ghosts,
                 "band": number in settings.bands,
@@ -236,6 +245,23 @@ def carried(
         ],
     }
     return Carried(data, packed)
+
+
+def _sentence(reason: Reason, run: int, best: int | None, loss: Reason) -> list[Any]:
+    """Return a reason's sentence, its instant, else that of the loss, and the run in which it can be seen."""
+    event = reason.event or loss.event
+    return [str(reason), event and event.time, best if reason.beside else run]
+
+
+def _events(run: Results) -> list[dict[str, Any]]:
+    """Return the events of a run as the viewer lists them; those that several columns tell alike, once."""
+    found: dict[tuple[float, str], dict[str, Any]] = {}
+    for event in events_in(run):
+        label = label_of(event)
+        unit = unit_of_signal(run.units.get(event.signal, "")) if event.unit == "SI" else event.unit
+        listed = {"time": event.time, "until": event.until, "label": label, "far": far_of(event, unit)}
+        found.setdefault((event.time, label), listed | {"signal": event.signal})
+    return [*found.values()]
 
 
 def _sizes(packed: Sequence[PackedRun]) -> Iterator[int]:
@@ -342,6 +368,11 @@ def _drawn(view: View, results: Sequence[Results]) -> dict[str, Any]:
 def _panels(results: Sequence[Results], spec: str) -> Iterator[str]:
     """Yield the panels that a name selects: columns, each with the column of its reference."""
     first, *others = (part.strip() for part in spec.split(","))
+    if " + " in first:
+        terms = [_columns(results, term)[:1] for term in first.split(" + ")]
+        if all(terms):
+            yield " + ".join(column for term in terms for column in term)
+        return
     minuend, _, subtrahend = first.partition(" - ")
     error = minuend.removesuffix("_error")
     for column in _columns(results, minuend) or _columns(results, error):
@@ -358,7 +389,8 @@ def _panels(results: Sequence[Results], spec: str) -> Iterator[str]:
 def _needed(views: Sequence[Mapping[str, Any]], roads: Sequence[Mapping[str, Any] | None]) -> set[str]:
     """Return the columns of all views and roads."""
     panels = (panel for view in views for panel in view["panels"])
-    named = {part.strip() for panel in panels for spec in panel.split(",") for part in spec.split(" - ")}
+    named = {part for panel in panels for spec in panel.split(",") for part in re.split(" [-+] ", spec)}
+    named |= {view["x"] for view in views}
     return named | {name for road in roads for name in (road or {}).values() if isinstance(name, str)}
 
 
@@ -377,8 +409,25 @@ def _signals(results: Sequence[Results]) -> dict[str, dict[str, Any]]:
 
 def _values(runs: Sequence[LabelledRun], name: str) -> list[str]:
     """Return a metric of every run as text, "" where a run has none."""
-    values = [evaluate(run.results, metric(name)) for run in runs]
-    return [shown(value.number, value.shown_in) if value is not None else "" for value in values]
+    wanted = metric(name)
+    values = [(run.results, evaluate(run.results, wanted)) for run in runs]
+    return [
+        shown(value.number, value.shown_in) + (", still growing" if _grows(run, wanted) else "")
+        if value is not None
+        else ""
+        for run, value in values
+    ]
+
+
+def _grows(run: Results, wanted: Metric) -> bool:
+    """Return whether a peak is that of the last sample: it would have become larger."""
+    columns = columns_of(run, wanted.signal) if wanted.name.startswith("peak(") and not wanted.other else ()
+    if wanted.window:
+        return False
+    for column in columns[:1]:
+        size = np.abs(while_moving(run).columns[column])
+        return bool(size.size > 1 and size[-1] > np.max(size[:-1]))
+    return False
 
 
 def still_of(results: Sequence[Results]) -> float:

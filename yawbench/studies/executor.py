@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
 from yawbench.foundation import plugins
-from yawbench.foundation.errors import ResultsError, ScenarioError
+from yawbench.foundation.errors import ResultsError, ScenarioError, YawbenchError
 from yawbench.foundation.workers import Pool
 from yawbench.orchestrator.plan import Plan
 from yawbench.orchestrator.results.freshness import staleness
@@ -29,6 +29,7 @@ from yawbench.planner import Planner
 from .experiment import Case, LoadedExperiment, NamedRun, PlannedExperiment, plan_experiment
 from .experiment_result import Each, ExperimentResult, judge_records, judge_results
 from .jobs import Job, MeasuredRun, OnOutcome, Outcome, execute_each, pool_for, read_back, ready
+from .jobs import planned as planned_run
 from .journal import Journal
 from .on_demand import OnDemand
 
@@ -171,7 +172,9 @@ class Executor(AbstractContextManager["Executor"]):
                 else []
             )
 
-    def keeping(self, findings: ExperimentResult, numbers: Collection[int]) -> ExperimentResult:
+    def keeping(
+        self, findings: ExperimentResult, numbers: Collection[int], record: Sequence[str] = ()
+    ) -> ExperimentResult:
         """Return a result whose cases with these numbers keep their results.
 
         Which runs are worth keeping is known when all have been judged. Those without results are made
@@ -180,13 +183,24 @@ class Executor(AbstractContextManager["Executor"]):
         Args:
             findings: of an experiment with axes.
             numbers: of its cases.
+            record: signals, or patterns of names, that they record besides those of the experiment.
         """
         planned = findings.planned
         assert planned is not None
+        planner = Planner()
 
         def keeping(number: int) -> Job:
             job = planned.jobs[number]
-            return replace(job, keep=True) if number in numbers else job
+            if number not in numbers:
+                return job
+            kept = replace(job, keep=True)
+            if not record:
+                return kept
+            wider = replace(kept, record=(*job.record, *record))
+            try:
+                return replace(wider, plan=planned_run(wider, planner)[1])
+            except YawbenchError:  # of an FMU that is an object of the caller: it was planned with it
+                return kept
 
         jobs = OnDemand(range(len(planned.jobs)), keeping)
         lacking = {

@@ -12,7 +12,7 @@ from itertools import chain, zip_longest
 from typing import TYPE_CHECKING, Any, Literal
 
 from yawbench.events.kinds import events_in
-from yawbench.events.why import furthest_aside, lost, why
+from yawbench.events.why import lost_among
 from yawbench.figures.display import shown
 from yawbench.foundation.errors import text_of
 from yawbench.foundation.messages import printable
@@ -21,6 +21,7 @@ from yawbench.metrics.expressions import (
 )
 from yawbench.metrics.verdict import VerdictText
 from yawbench.orchestrator.results.reader import Results
+from yawbench.orchestrator.results.run_record import EventRecord
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -405,20 +406,26 @@ def marked(label: str, results: Results) -> str:
 
 
 def remarks(runs: Iterable[tuple[str, Results]]) -> list[str]:
-    """Return a note for each marked run of (label, results), and why a car was lost.
-
-    Where several runs are compared, with the one that turned aside least beside.
-    """
+    """Return a note for each marked run of (label, results), and why a car was lost."""
     shown = [*runs]
     notes = [f"{MARK} {label}: {says}" for label, results in shown if (says := _remarkable(results))]
-    events = [events_in(results) for _, results in shown]
-    best = (
-        min((e for e in events if not lost(e)), key=furthest_aside, default=None) if len(shown) > 1 else None
-    )
-    for (label, _), own in zip(shown, events, strict=True):
-        if reasons := why(own, best):
-            notes.append(f"{label}: lost because {'; '.join(map(str, reasons))}")
-    return notes
+    return [*notes, *lost_notes([(label, events_in(results)) for label, results in shown])]
+
+
+def lost_notes(
+    runs: Sequence[tuple[str, Sequence[EventRecord]]], most: int | None = None, *, comparable: bool = True
+) -> list[str]:
+    """Return why cars were lost, of runs as (label, events); `comparable`: see `lost_among`.
+
+    Of more than `most`, the first have notes, and a last note says how many more there are.
+    """
+    found = lost_among([events for _, events in runs], comparable=comparable)
+    notes = [
+        f"{runs[number][0]}: lost because {'; '.join(map(str, reasons))}" for number, reasons, _ in found
+    ]
+    if most is None or len(notes) <= most:
+        return notes
+    return [*notes[:most], f"{len(notes) - most} more runs were lost; the page says why"]
 
 
 def _remarkable(results: Results) -> str:

@@ -17,6 +17,10 @@ async function unpacked(element) {
 let opened = [];
 const unfold = (details) => details.querySelectorAll(':scope > template:not([data-packed])').forEach((folded) => folded.replaceWith(folded.content));
 addEventListener('toggle', ({target}) => { if (target.open) unfold(target); }, true);
+// The browser finds what is unfolded, and opens what it finds: before it looks, everything is.
+addEventListener('keydown', ({key, ctrlKey, metaKey}) => {
+  if (key === 'F3' || key === '/' || ((ctrlKey || metaKey) && key.toLowerCase() === 'f')) document.querySelectorAll('details').forEach(unfold);
+});
 addEventListener('beforeprint', () => { opened = [...document.querySelectorAll('details:not([open])')]; opened.forEach((details) => { unfold(details); details.open = true; }); });
 addEventListener('afterprint', () => { opened.forEach((details) => { details.open = false; }); });
 

@@ -12,6 +12,8 @@ const BESIDE_RUNS = 7; // runs opened with a point: as many as there are colours
 const escaped = (text) => String(text).replace(/[&<>"]/g, (one) => `&#${one.charCodeAt(0)};`);
 const signed = (text) => text.replace('-', '−');
 
+function opacityOf(shade) { return (0.07 + (0.5 * shade) / (SHADES - 1)).toFixed(2); }
+
 class Sweep extends InAddress {
   constructor(root, data) {
     super();
@@ -241,7 +243,7 @@ class Sweep extends InAddress {
       if (look === 'corner') return `<path class="ys-corner" d="${path}"/>`;
       const [kind, shade, pale] = look.split(' ');
       if (shade === 'none') return `<path class="ys-none${pale ? ' ys-pale' : ''}" d="${path}"/>`;
-      return `<path class="ys-${kind}${pale ? ' ys-pale' : ''}" fill-opacity="${(0.07 + (0.5 * Number(shade)) / (SHADES - 1)).toFixed(2)}" d="${path}"/>`;
+      return `<path class="ys-${kind}${pale ? ' ys-pale' : ''}" fill-opacity="${opacityOf(Number(shade))}" d="${path}"/>`;
     });
     const heads = maps.map((k, at) => {
       const [x0, y0] = [(at % beside) * frame + left, Math.floor(at / beside) * high + top];
@@ -256,13 +258,32 @@ class Sweep extends InAddress {
         + (x ? `<text class="ys-quiet" x="${x0}" y="${y0 + up * ch + 29}">right: ${escaped(label(x))}${named || !this.data.grid ? '' : `, ${across} values`}</text>` : '');
     });
     const total = Math.ceil(maps.length / beside) * high;
-    const words = this.metric ? `${this.metric.label}${this.metric.unit ? ` in ${this.metric.unit}` : ''}, stronger: larger` : '';
-    const key = this.state.limit === null || !this.metric ? escaped(words)
-      : `${escaped(words)}; <tspan class="ys-corner">◥</tspan> orange: beyond ${escaped(`${this.state.limit} ${this.metric.unit}`)}`;
-    const legend = key.length * 6 > wide && this.state.limit !== null ? key.replace('; <tspan', `<tspan x="0" dy="15"></tspan><tspan`) : key;
-    holder.innerHTML = `<svg viewBox="0 0 ${wide} ${total + (legend === key ? 18 : 33)}" aria-hidden="true">${paths.join('')}${heads.join('')}${texts.join('')}`
-      + `<text class="ys-quiet" x="0" y="${total + 12}">${legend}</text><path class="ys-open"/><path class="ys-cursor"/></svg>`;
+    holder.innerHTML = `<svg viewBox="0 0 ${wide} ${total + 36}" aria-hidden="true">${paths.join('')}${heads.join('')}${texts.join('')}`
+      + `${this.metric ? this.legend(total + 12) : ''}<path class="ys-open"/><path class="ys-cursor"/></svg>`;
     this.mark();
+  }
+
+  // The scale of all maps: the shades from the smallest value to the largest, and the limit between its two sides.
+  legend(y) {
+    const {metric, state: {limit}} = this;
+    const [low, high] = metric.range;
+    const between = limit !== null && limit > low && limit < high;
+    const sides = limit === null ? ['within'] : between ? (this.atMost ? ['within', 'beyond'] : ['beyond', 'within']) : [(limit >= high) === this.atMost ? 'within' : 'beyond'];
+    const numbers = [low, ...(between ? [limit] : []), high].map((one) => (one === limit ? signed(String(limit)) : this.inCell(one)));
+    const words = `${metric.label}${metric.unit ? ` in ${metric.unit}` : ''}, all maps${limit === null ? '' : '; ◥ orange: beyond the limit'}`;
+    let x = 0;
+    const parts = [`<text class="ys-quiet" x="0" y="${y}">${escaped(words)}</text>`];
+    const number = (text) => {
+      parts.push(`<text class="ys-quiet" x="${x}" y="${y + 17}" font-size="11">${escaped(text)}</text>`);
+      x += 6.6 * text.length + 6;
+    };
+    number(numbers[0]);
+    sides.forEach((side, k) => {
+      for (let shade = 0; shade < SHADES; shade++) parts.push(`<path class="ys-${side}" fill-opacity="${opacityOf(shade)}" d="M${x + 14 * shade} ${y + 7}h13v11h-13z"/>`);
+      x += 14 * SHADES + 6;
+      number(numbers[k + 1]);
+    });
+    return parts.join('');
   }
 
   label({value, made}) {

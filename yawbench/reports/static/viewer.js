@@ -23,13 +23,27 @@ function readAddress(key) {
   return own === undefined ? null : new URLSearchParams(own.slice(key.length + 1));
 }
 
-// Write the state of a part of the page into the address, and return the fragment; not over a link just followed.
-function writeAddress(key, words) {
+// Every step that can be undone is an entry of the browser's history, with its number.
+let depth = history.state?.depth ?? 0;
+let followed = false; // whether the address is that of a link just followed, which says nothing of the other parts
+history.replaceState({depth}, '');
+addEventListener('hashchange', () => {
+  const {state} = history;
+  followed = !state;
+  if (!state) history.replaceState({depth: depth + 1, link: !location.hash.includes('?')}, ''); // a link of the page
+  depth = history.state.depth;
+});
+
+// Write the state of a part of the page into the address, as a step that Back undoes or in place of the one before, and
+// return the fragment; not over a link just followed.
+function writeAddress(key, words, step = false) {
   if (location.hash !== heard) return null;
   const others = location.hash.slice(1).split('&&').filter((part) => part.includes('?') && !part.startsWith(key + '?'));
   const all = [...others, ...(words.size || others.length || location.hash.includes('?') ? [`${key}?${words}`] : [])];
   const written = '#' + all.join('&&');
-  if (all.length && location.hash !== written) history.replaceState(null, '', written);
+  if (all.length && location.hash !== written) {
+    if (step) history.pushState({depth: ++depth}, '', written); else history.replaceState(history.state, '', written);
+  }
   heard = location.hash;
   return written;
 }
@@ -43,7 +57,7 @@ function headingLevel(place) {
 }
 
 // A part of the page whose state is in the address under its `key`. `initial()` returns the state without one;
-// `kinds()`, by name, what tells whether a value can be taken over.
+// `kinds()`, by name, what tells whether a value can be taken over. What changes but the time is a step for Back.
 class InAddress {
   remember(plain = this.initial()) {
     const words = new URLSearchParams();
@@ -51,13 +65,19 @@ class InAddress {
       if (JSON.stringify(value) === JSON.stringify(plain[name])) continue;
       words.set(name, JSON.stringify(name === 'time' ? Number(value.toFixed(6)) : value));
     }
-    this.written = writeAddress(this.key, words);
+    const lasting = this.lasts();
+    this.written = writeAddress(this.key, words, lasting !== (this.lasting ?? lasting));
+    this.lasting = lasting;
   }
 
-  // Take over what the address says; return whether it says anything about this part.
+  lasts() { return JSON.stringify({...this.state, time: 0}); }
+
+  // Take over what the address says; return whether it says anything about this part. Back to an address that says
+  // nothing is back to the beginning.
   restore() {
-    const own = location.hash === this.written ? null : readAddress(this.key);
-    if (!own) return false;
+    if (location.hash === this.written) return false;
+    const own = readAddress(this.key) ?? (this.lasting === undefined || followed || history.state?.link ? null : new URLSearchParams());
+    if (!own) { this.lasting ??= this.lasts(); return false; }
     const [state, kinds] = [this.initial(), this.kinds()];
     for (const [name, text] of own) {
       let value;
@@ -65,6 +85,8 @@ class InAddress {
       if (Object.hasOwn(kinds, name) && kinds[name](value)) Object.assign(state, {[name]: value}, this.implied(name, value));
     }
     this.state = state;
+    this.written = location.hash;
+    this.lasting = this.lasts();
     return true;
   }
 
@@ -72,10 +94,13 @@ class InAddress {
   implied() { return {}; }
 }
 
+// Further parts of every viewer, from other files: functions of the viewer, called when its panels are drawn.
+const viewerParts = [];
+
 class Viewer extends InAddress {
   constructor(root, data, runs) {
     super();
-    Object.assign(this, {root, data, runs});
+    Object.assign(this, {root, data, runs, listeners: new Set(), density: undefined});
     this.find = (name) => root.querySelector('.yv-' + name);
     this.key = root.id;
     this.fill();
@@ -83,6 +108,7 @@ class Viewer extends InAddress {
     this.restore();
     this.shift();
     this.panels = [];
+    this.axis = new Axis(this);
     this.removal = new AbortController();
     this.listen();
     this.road = null;
@@ -109,8 +135,10 @@ class Viewer extends InAddress {
     if (this.runs.some((run) => run.road)) {
       this.road = new Road(this);
       this.road.arrange();
-      this.road.draw();
+      this.subscribe(() => this.road.draw(this.density));
     }
+    this.events = new Events(this);
+    for (const part of viewerParts) part(this);
     this.root.classList.add('yv-ready');
   }
 
@@ -121,6 +149,19 @@ class Viewer extends InAddress {
     if (this.road) this.road.pause();
     this.removal.abort();
     this.observer.disconnect();
+  }
+
+  // Call `listener`, now and whenever any of it changes, with {time, shown, colours}: the cursor's time in s, the shown
+  // runs (`Run`, in the order of the table), and the colour of each. Return a function that ends it.
+  subscribe(listener) {
+    this.listeners.add(listener);
+    listener(this.news);
+    return () => this.listeners.delete(listener);
+  }
+
+  get news() {
+    const shown = this.runs.filter((run) => this.shows(run));
+    return {time: this.state.time, shown, colours: shown.map((run) => this.colour(run))};
   }
 
   // What depends on the runs: their table, the views and signals to choose from, the legend.
@@ -137,7 +178,7 @@ class Viewer extends InAddress {
       const row = made('tr');
       row.dataset.run = k;
       const label = made('label', made('input', '', {type: 'checkbox', className: 'yv-show'}));
-      label.append(' ', made('span', '', {className: 'yv-swatch'}), ' ', made('span', run.label, {id: `${key}-run-${k}`}));
+      label.append(' ', made('span', '', {className: 'yv-swatch'}), ' ', made('span', run.label, {id: `${key}-run-${k}`, className: 'yv-label'}));
       row.append(made('th', label, {scope: 'row'}));
       if (several) {
         const base = made('input', '', {type: 'radio', className: 'yv-base', name: `${key}-baseline`});
@@ -149,7 +190,12 @@ class Viewer extends InAddress {
         offset.setAttribute('aria-labelledby', `${key}-run-${k} ${key}-offset`);
         row.append(run.dash ? made('td', offset) : made('td'));
       }
-      for (const [, values] of data.metrics) row.append(made('td', values[k] || '–', {className: 'yv-metric'}));
+      for (const [, values] of data.metrics) {
+        const [value, remark] = (values[k] || '–').split(', ');
+        const cell = made('td', value, {className: 'yv-metric'});
+        if (remark) cell.append(made('small', remark));
+        row.append(cell);
+      }
       return row;
     };
     find('rest').hidden = data.runs.length <= FEW;
@@ -170,7 +216,7 @@ class Viewer extends InAddress {
 
   initial() {
     return {
-      view: 0, ...this.viewed(0), span: null, time: this.data.still,
+      view: 0, ...this.viewed(0), span: null, heights: {}, tall: [], time: this.data.still, pin: null, lit: null,
       difference: false, tolerance: 0, camera: 'cars', near: 1, offsets: {},
     };
   }
@@ -187,29 +233,54 @@ class Viewer extends InAddress {
 
   kinds() {
     const isRun = (v) => Number.isInteger(v) && v in this.runs;
+    const isSpan = (v) => Array.isArray(v) && v.length === 2 && v.every(Number.isFinite) && v[0] < v[1];
+    const isRecord = (v) => v && typeof v === 'object' && !Array.isArray(v);
     return {
       view: (v) => Number.isInteger(v) && v in this.data.views,
       shown: (v) => Array.isArray(v) && v.every(isRun),
       baseline: isRun,
       panels: (v) => Array.isArray(v) && v.every((n) => typeof n === 'string' && this.known(n)),
-      span: (v) => v === null || (Array.isArray(v) && v.length === 2 && v.every(Number.isFinite) && v[0] < v[1]),
+      span: (v) => v === null || isSpan(v),
+      heights: (v) => isRecord(v) && Object.values(v).every(isSpan), tall: (v) => Array.isArray(v) && v.every((one) => typeof one === 'string'),
+      pin: (v) => v === null || Number.isFinite(v),
+      lit: (v) => v === null || (Array.isArray(v) && v.length === 3 && typeof v[0] === 'string' && this.known(v[0]) && (v[1] === null || Number.isFinite(v[1])) && typeof v[2] === 'string'),
       time: Number.isFinite, difference: (v) => typeof v === 'boolean', tolerance: (v) => Number.isFinite(v) && v >= 0,
       x: (v) => this.axes().includes(v), camera: (v) => v === 'cars' || v === 'whole' || isRun(v),
       near: (v) => v >= ZOOM[0] && v <= ZOOM[1],
-      offsets: (v) => v && typeof v === 'object' && !Array.isArray(v) && Object.values(v).every(Number.isFinite),
+      offsets: (v) => isRecord(v) && Object.values(v).every(Number.isFinite),
     };
   }
 
-  implied(name, value) { return name === 'view' ? this.viewed(value) : {}; }
+  implied(name, value) {
+    if (name === 'view') return this.viewed(value);
+    return {};
+  }
+
+  // What a claim judges (`lit`: its signal, its bound, its words) has the first panel; the cursor goes to its peak.
+  restore() {
+    if (!super.restore()) return false;
+    const {lit} = this.state;
+    if (!lit || readAddress(this.key)?.has('time')) return true;
+    const own = this.state.panels.find((spec) => spec.split(',').includes(lit[0])) ?? lit[0];
+    this.state.panels = [own, ...this.state.panels.filter((spec) => spec !== own)];
+    const run = this.lead();
+    if (run.has(lit[0])) {
+      const size = run.column(lit[0]).map((value) => (Number.isFinite(value) ? Math.abs(value) : 0));
+      this.state.time = run.time[size.indexOf(extremes(size)[1])] + this.offset(run.number);
+    }
+    return true;
+  }
 
   // ---- runs ----
 
   shift() {
     for (const run of this.runs) {
-      const by = this.state.offsets[run.number] || 0;
+      const by = this.offset(run.number);
       run.shifted = by ? run.time.map((t) => t + by) : run.time;
     }
   }
+
+  offset(number) { return this.state.offsets[number] || 0; }
 
   shows(run) { return this.state.shown.includes(run.number); }
 
@@ -231,25 +302,43 @@ class Viewer extends InAddress {
     return run.ghost ? colour + (colour.length === 4 ? '7' : '73') : colour; // a hexadecimal alpha
   }
 
+  // A run's colour for what is drawn behind its line.
+  faint(run) {
+    const colour = this.theme.runs[this.style(run)];
+    return colour + (colour.length === 4 ? '5' : '59');
+  }
+
   dash(run) { return run.dash || this.data.dashes[this.style(run)]; }
 
   meaning(name) {
-    const [one, other] = name.split(' - ').map((part) => this.data.signals[part]);
+    const [first, ...rest] = name.split(/ ([-+]) /);
+    const one = this.data.signals[first];
     if (!one) return {label: name, unit: '', factor: 1};
-    if (!other) return one;
-    const reference = name.endsWith(`${name.split(' - ')[0].replace(/^.*\./, '')}_ref`);
-    return {...one, label: reference ? `${one.label}, error` : `${one.label} minus ${other.label.toLowerCase()}`};
+    if (name.endsWith(` - ${rest[1]}`) && rest[1].endsWith(`${first.replace(/^.*\./, '')}_ref`)) return {...one, label: `${one.label}, error`};
+    const words = rest.map((part) => ({'-': 'minus', '+': 'plus'}[part] ?? this.data.signals[part].label.toLowerCase()));
+    return {...one, label: [one.label, ...words].join(' ')};
   }
 
-  swatch(run, reference) {
+  // A piece of a run's line; `reference`: the colour of its reference, which is wide.
+  swatch(run, reference = '') {
     const dash = this.dash(run).map((part) => (2.2 * part).toFixed(1)).join(' ');
-    const stroke = reference || !this.shows(run) ? this.theme.pale : this.colour(run);
+    const stroke = reference || (this.shows(run) ? this.colour(run) : this.theme.pale);
     return `<svg width="30" height="10" aria-hidden="true"><line x1="1" y1="5" x2="29" y2="5" stroke="${stroke}" `
       + `stroke-width="${reference ? 5 : 2.2}"${dash && !reference ? ` stroke-dasharray="${dash}"` : ''}/></svg>`;
   }
 
-  // Whether instants and limits of a run are drawn, or those of all runs: only while it, or any, is shown.
-  tells(run = this.data.dashed_of) { return (run ?? null) === null ? this.state.shown.length > 0 : this.state.shown.includes(run); }
+  // Whether instants and limits of a run, or of all runs, are drawn: only while it, or any, is shown.
+  tells(run) { return run === null ? this.state.shown.length > 0 : this.state.shown.includes(run); }
+
+  // Limit curves of the plane of the horizontal axis and a signal, as [text, x in shown units, y in SI].
+  curves(name) {
+    if (!this.portrait || this.state.difference) return [];
+    const {factor} = this.data.signals[this.state.x];
+    return this.data.curves.filter(([x, y, , , , run]) => x === this.state.x && y === name && this.tells(run))
+      .map(([, , says, xs, ys]) => [says, xs.map((value) => value * factor), ys]);
+  }
+
+  get portrait() { return this.state.x in this.data.signals; }
 
   faults() { return this.runs.filter((run) => this.shows(run)).flatMap((run) => run.faults); }
 
@@ -277,7 +366,8 @@ class Viewer extends InAddress {
   // The signals of a text of the reader, by name, by variable, by label or by a part of one, as a panel names them.
   // Throw a sentence for the reader if there are none or several.
   named(text) {
-    return text.split(',').map((spec) => spec.trim().split(' - ').map((part) => this.signalOf(part.trim())).join(' - ')).join(',');
+    const signal = (part) => (/^ [-+] $/.test(part) ? part : this.signalOf(part.trim()));
+    return text.split(',').map((spec) => spec.trim().split(/( [-+] )/).map(signal).join('')).join(',');
   }
 
   signalOf(text) {
@@ -297,7 +387,7 @@ class Viewer extends InAddress {
     throw new Error(partial ? `this page has no signal ${text}; yawbench plot --page shows all that was recorded` : `no signal ${text} was recorded`);
   }
 
-  known(spec) { return spec.split(',').every((name) => name.trim().split(' - ').every((part) => part in this.data.signals)); }
+  known(spec) { return spec.split(',').every((name) => partsOf(name.trim()).every((part) => part in this.data.signals)); }
 
   // ---- the horizontal axis ----
 
@@ -323,6 +413,7 @@ class Viewer extends InAddress {
   whole() {
     let range = [Infinity, -Infinity];
     for (const run of this.runs) if (this.shows(run)) range = extremes(this.horizontal(run), range);
+    for (const [, xs] of this.state.panels.flatMap((spec) => this.curves(spec))) if (xs[0] === xs.at(-1)) range = extremes(xs, range); // closed
     if (!(range[0] <= range[1])) return [0, 1];
     if (this.state.x !== 'time' && this.state.x !== 'distance') {
       const room = 0.04 * (range[1] - range[0]) || 1;
@@ -337,8 +428,29 @@ class Viewer extends InAddress {
     const [low, high] = this.whole();
     if (span && !(span[1] - span[0] > 1e-9 * Math.max(Math.abs(low), Math.abs(high), 1))) return;
     this.state.span = span && (span[0] > low || span[1] < high) ? span : null;
-    for (const panel of this.panels) panel.zoom();
+    for (const chart of [...this.panels, this.axis]) chart.zoom();
     this.moveCursor();
+  }
+
+  // Show a span of a width, within the whole.
+  panTo(from, wide) {
+    const [low, high] = this.whole();
+    const width = Math.min(wide, high - low);
+    const begin = Math.min(Math.max(from, low), high - width);
+    this.zoomTo([begin, begin + width]);
+  }
+
+  // Show values of a panel from one to another, in shown units.
+  setHeights(spec, [low, high]) {
+    if (!(high - low > 1e-12 * Math.max(Math.abs(low), Math.abs(high), 1e-9))) return;
+    this.state.heights = {...this.state.heights, [spec]: [low, high]};
+    this.panels.find((panel) => panel.spec === spec)?.zoom();
+    this.moveCursor();
+  }
+
+  showWhole() {
+    this.state.heights = {};
+    this.zoomTo(null);
   }
 
   zoom(factor, around) {
@@ -351,8 +463,7 @@ class Viewer extends InAddress {
 
   // ---- the cursor ----
 
-  pointAt(panel, left, event) {
-    if (event.buttons) return; // a zoom is being drawn
+  pointAt(panel, left, top) {
     const value = panel.plot.posToVal(left, 'x');
     if (this.state.x === 'time') { this.seek(value, true); return; }
     const lead = this.lead();
@@ -363,7 +474,7 @@ class Viewer extends InAddress {
     const [from, to] = this.span();
     for (let i = 0; i < xs.length; i++) {
       const across = ((xs[i] - value) / (to - from)) * wide;
-      const up = ys && this.state.x !== 'distance' ? panel.plot.valToPos(ys.values[i] * panel.meaning.factor, 'y') - event.offsetY : 0;
+      const up = ys && this.state.x !== 'distance' ? panel.plot.valToPos(ys.values[i] * panel.meaning.factor, 'y') - top : 0;
       const far = across * across + up * up;
       if (far < least) [best, least] = [i, far];
     }
@@ -393,22 +504,37 @@ class Viewer extends InAddress {
   follow() {
     const {span, time, x} = this.state;
     if (!span || x !== 'time' || (time >= span[0] && time <= span[1])) return;
-    const [low, high] = this.whole();
-    const wide = span[1] - span[0];
-    const from = Math.min(Math.max(time - wide / 2, low), high - wide);
-    this.zoomTo([from, from + wide]);
+    this.panTo(time - (span[1] - span[0]) / 2, span[1] - span[0]);
+  }
+
+  // Go to an instant of a run, and show the run.
+  goTo(time, number) {
+    if (!this.state.shown.includes(number)) this.showRuns([...this.state.shown, number], this.state.baseline);
+    this.seek(time + this.offset(number));
+  }
+
+  setPin(on = this.state.pin === null) {
+    this.state.pin = on ? this.state.time : null;
+    this.refresh();
   }
 
   moveCursor() {
     for (const panel of this.panels) panel.moveCursor();
     const words = `${this.state.time.toFixed(3)} s`;
+    const {pin, time} = this.state;
     this.find('clock').textContent = words;
+    this.find('since').textContent = pin === null ? '' : `${decimal(time - pin, 3)} s since ${pin.toFixed(3)} s`;
     const slider = this.find('slider');
     slider.value = this.state.time;
     slider.setAttribute('aria-valuetext', words);
-    if (this.road) this.road.draw();
+    this.tell();
     clearTimeout(this.later);
     this.later = setTimeout(() => this.remember(), 200);
+  }
+
+  tell() {
+    const {news} = this;
+    for (const listener of this.listeners) listener(news);
   }
 
   get step() {
@@ -432,6 +558,9 @@ class Viewer extends InAddress {
     this.drawTable();
     const holder = this.find('panels');
     this.panels = this.state.panels.map((spec) => new Panel(this, spec));
+    this.root.classList.toggle('yv-pinned', this.state.pin !== null);
+    this.find('pin').setAttribute('aria-pressed', this.state.pin !== null);
+    this.find('undo').disabled = !depth;
     holder.replaceChildren(...this.panels.map((panel) => panel.root));
     this.find('difference').checked = this.state.difference;
     this.find('tolerance').value = this.state.tolerance || '';
@@ -446,24 +575,25 @@ class Viewer extends InAddress {
 
   redraw(most = Infinity) {
     this.wide = this.root.clientWidth; // before: drawn panels may bring a scroll bar, and then another width
+    this.axis.draw(this.axis.chart.clientWidth);
     this.drawPanels(0, most);
     this.moveCursor();
   }
 
   drawPanels(first, most = Infinity) {
     const wide = this.panels[first]?.chart.clientWidth; // of all: asked for once, as it makes the browser lay out
-    for (const panel of this.panels.slice(first, most)) panel.draw(panel === this.panels.at(-1), wide);
+    for (const panel of this.panels.slice(first, most)) panel.draw(wide);
   }
 
   resized() {
     if (this.root.classList.contains('yv-print')) return;
-    if (this.root.clientWidth !== this.wide) this.redraw(); else if (this.road) this.road.draw();
+    if (this.root.clientWidth !== this.wide) this.redraw(); else this.tell();
   }
 
   print(printing = true) {
     this.root.classList.toggle('yv-print', printing);
-    this.refresh(printing ? PAPER : undefined);
-    if (this.road && printing) this.road.draw(PAPER);
+    this.density = printing ? PAPER : undefined;
+    this.refresh(this.density);
   }
 
   drawTable() {
@@ -478,6 +608,7 @@ class Viewer extends InAddress {
     for (const row of body.rows) {
       const k = Number(row.dataset.run);
       row.querySelector('.yv-show').checked = this.shows(this.runs[k]);
+      row.querySelector('.yv-label').textContent = this.runs[k] === this.baseline ? this.runs[k].label : this.drawnLabel(this.runs[k]);
       const base = row.querySelector('.yv-base');
       if (base) base.checked = this.state.baseline === k;
       row.querySelector('.yv-swatch').innerHTML = this.shows(this.runs[k]) ? this.swatch(this.runs[k]) : '';
@@ -522,6 +653,7 @@ class Viewer extends InAddress {
         if (!this.state.panels.includes(spec)) this.state.panels.push(spec);
         add.value = '';
         this.refresh();
+        this.panels[this.state.panels.indexOf(spec)].root.scrollIntoView({block: 'center'});
       });
     });
     this.find('x').addEventListener('change', (event) => {
@@ -538,11 +670,16 @@ class Viewer extends InAddress {
       if (this.state.tolerance) this.state.difference = true;
       this.refresh();
     });
-    this.find('all').addEventListener('click', () => this.zoomTo(null));
+    this.find('all').addEventListener('click', () => this.showWhole());
+    this.find('pin').addEventListener('click', () => this.setPin());
+    this.find('undo').addEventListener('click', () => this.undo());
+    this.find('reset').addEventListener('click', () => this.reset());
     this.find('in').addEventListener('click', () => this.zoom(1.6));
     this.find('out').addEventListener('click', () => this.zoom(1 / 1.6));
     this.find('csv').addEventListener('click', () => saveFile(new Blob([this.csv()], {type: 'text/csv'}), this.fileName('csv')));
     this.find('png').addEventListener('click', () => this.picture().toBlob((blob) => saveFile(blob, this.fileName('png'))));
+    this.find('svg').addEventListener('click', () => saveFile(new Blob([this.drawing()], {type: 'image/svg+xml'}), this.fileName('svg')));
+    this.find('more').addEventListener('toggle', () => this.tellCommand());
     this.find('link').addEventListener('click', (event) => { this.remember(); copyAddress(event.target); });
     this.find('slider').addEventListener('input', (event) => this.seek(Number(event.target.value)));
     const keys = this.data.alone ? document : this.root; // several viewers of a page: the one with the focus
@@ -557,6 +694,33 @@ class Viewer extends InAddress {
     field.reportValidity();
   }
 
+  // The command that draws what is shown.
+  tellCommand() {
+    const command = commandOf(this);
+    this.find('command').textContent = command;
+    this.find('command').hidden = !command;
+  }
+
+  // The view on a canvas, and as SVG.
+  picture() { return canvasOf(this); }
+
+  drawing() { return svgOf(this); }
+
+  undo() {
+    this.remember();
+    if (depth) history.back();
+  }
+
+  reset() {
+    this.state = {...this.initial(), time: this.state.time};
+    this.refresh();
+  }
+
+  showRuns(shown, baseline) {
+    Object.assign(this.state, {shown: [...new Set(shown)].sort((one, other) => one - other), baseline});
+    this.refresh();
+  }
+
   setDifference(on) {
     this.state.difference = on && this.runs.length > 1;
     this.refresh();
@@ -565,15 +729,19 @@ class Viewer extends InAddress {
   pressed(event) {
     const {tagName, type} = event.target;
     const typing = tagName === 'SELECT' || (tagName === 'INPUT' && !['checkbox', 'radio', 'range'].includes(type));
-    if (event.altKey || event.ctrlKey || event.metaKey || typing) return;
+    if (event.altKey || typing) return;
+    if ((event.ctrlKey || event.metaKey) && event.key === 'z') { event.preventDefault(); this.undo(); return; }
+    if (event.ctrlKey || event.metaKey) return;
+    const panel = this.panels.find(({root}) => root.contains(event.target)) ?? this.panels[0];
     const far = event.shiftKey ? 10 : 1;
     const actions = {
       ArrowLeft: () => this.seek(this.state.time - far * this.step),
       ArrowRight: () => this.seek(this.state.time + far * this.step),
       Home: () => this.seek(this.ends()[0]),
       End: () => this.seek(this.ends()[1]),
-      '+': () => this.zoom(1.6), '-': () => this.zoom(1 / 1.6), 0: () => this.zoomTo(null),
-      d: () => this.setDifference(!this.state.difference),
+      '+': () => this.zoom(1.6), '-': () => this.zoom(1 / 1.6), 0: () => this.showWhole(),
+      i: () => panel?.zoomUp(1.25), o: () => panel?.zoomUp(0.8), k: () => panel?.goToPeak(),
+      d: () => this.setDifference(!this.state.difference), p: () => this.setPin(), u: () => this.undo(),
     };
     if (type === 'radio') { delete actions.ArrowLeft; delete actions.ArrowRight; }
     if (tagName !== 'BUTTON' && type !== 'checkbox' && type !== 'radio' && this.road) actions[' '] = () => this.road.toggle();
@@ -584,6 +752,19 @@ class Viewer extends InAddress {
 
   removePanel(spec) {
     this.state.panels = this.state.panels.filter((one) => one !== spec);
+    this.refresh();
+  }
+
+  movePanel(spec, by) {
+    const panels = this.state.panels.filter((one) => one !== spec);
+    panels.splice(this.state.panels.indexOf(spec) + by, 0, spec);
+    this.state.panels = panels;
+    this.refresh();
+  }
+
+  enlarge(spec) {
+    const {tall} = this.state;
+    this.state.tall = tall.includes(spec) ? tall.filter((one) => one !== spec) : [...tall, spec];
     this.refresh();
   }
 
@@ -614,43 +795,6 @@ class Viewer extends InAddress {
       }
     }
     return lines.join('\n') + '\n';
-  }
-
-  picture() {
-    const ratio = this.panels[0] ? this.panels[0].plot.ctx.canvas.width / this.panels[0].plot.width : 1;
-    const sheet = made('canvas');
-    const sizes = this.panels.map((panel) => panel.plot.ctx.canvas);
-    const head = 22 * ratio;
-    const line = 24 * ratio;
-    const c = sheet.getContext('2d');
-    const title = this.drawnInstead;
-    sheet.width = Math.max(...sizes.map((canvas) => canvas.width), 200);
-    c.font = `${13 * ratio}px system-ui, sans-serif`;
-    let [x, y] = [8 * ratio, title ? line : 0];
-    const legend = this.drawnRuns().map((run) => {
-      const label = this.drawnLabel(run);
-      const wide = 56 * ratio + c.measureText(label).width;
-      if (x > 8 * ratio && x + wide > sheet.width) [x, y] = [8 * ratio, y + line];
-      x += wide;
-      return {run, label, x: x - wide, y: y + line / 2};
-    });
-    sheet.height = sizes.reduce((sum, canvas) => sum + canvas.height + head, y + line);
-    c.fillStyle = this.theme.ground;
-    c.fillRect(0, 0, sheet.width, sheet.height);
-    const words = {colour: this.theme.ink, size: 13 * ratio, halo: false};
-    if (title) text(c, title, 8 * ratio, line / 2, {...words, size: 15 * ratio});
-    for (const {run, label, x: left, y: middle} of legend) {
-      polyline(c, [left, left + 30 * ratio], [middle, middle]);
-      stroke(c, this.colour(run), 2.2, ratio, this.dash(run));
-      text(c, label, left + 36 * ratio, middle, words);
-    }
-    y += line;
-    for (const [k, panel] of this.panels.entries()) {
-      text(c, panel.root.querySelector('h4').textContent, 8 * ratio, y + head / 2, words);
-      c.drawImage(sizes[k], 0, y + head);
-      y += head + sizes[k].height;
-    }
-    return sheet;
   }
 }
 

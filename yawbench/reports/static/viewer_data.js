@@ -42,6 +42,9 @@ function place(time, t) {
   return [low, (t - time[low]) / (time[high] - time[low])];
 }
 
+// The signals of a sum or difference.
+function partsOf(name) { return name.split(/ [-+] /); }
+
 class Run {
   constructor(described, bytes, number) {
     Object.assign(this, described, {number});
@@ -52,23 +55,27 @@ class Run {
     this.decoded = new Map();
   }
 
-  has(name) { return name.split(' - ').every((part) => part in this.columns); }
+  has(name) { return partsOf(name).every((part) => part in this.columns); }
 
-  // A recorded signal, or the difference `a - b` of two.
+  // A recorded signal, or the sum and difference `a + b - c` of several.
   column(name) {
     if (!this.decoded.has(name)) this.decoded.set(name, this.decode(name));
     return this.decoded.get(name);
   }
 
   decode(name) {
-    const [one, other] = name.split(' - ');
-    if (other === undefined) return decoded(this.columns[name], this.rows, this.bytes);
-    const from = this.column(other);
-    return this.column(one).map((value, i) => value - from[i]);
+    const [first, ...rest] = name.split(/ ([-+]) /);
+    if (!rest.length) return decoded(this.columns[name], this.rows, this.bytes);
+    const sum = Float64Array.from(this.column(first));
+    for (let k = 0; k < rest.length; k += 2) {
+      const [sign, values] = [rest[k] === '-' ? -1 : 1, this.column(rest[k + 1])];
+      for (let i = 0; i < sum.length; i++) sum[i] += sign * values[i];
+    }
+    return sum;
   }
 
   // Values of a signal that lie closer to each other than this mean the same: the steps of their codes.
-  grain(name) { return name.split(' - ').reduce((sum, part) => sum + this.columns[part][2], 0); }
+  grain(name) { return partsOf(name).reduce((sum, part) => sum + this.columns[part][2], 0); }
 
   // The recorded value at t, of the nearest row; NaN where the run has none.
   at(name, t) {

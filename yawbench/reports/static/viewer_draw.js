@@ -116,13 +116,13 @@ function round(largest) {
   return [5, 2, 1].find((step) => step * power <= largest) * power;
 }
 
-function text(c, words, x, y, {align = 'left', colour = QUIET, size = 12, halo = true} = {}) {
+function text(c, words, x, y, {align = 'left', colour = QUIET, size = 12, halo = true, ground = GROUND} = {}) {
   c.font = `${size}px system-ui, sans-serif`;
   c.textAlign = align;
   c.textBaseline = 'middle';
   if (halo) {
-    c.strokeStyle = GROUND;
-    c.lineWidth = 3;
+    c.strokeStyle = ground;
+    c.lineWidth = size / 4;
     c.lineJoin = 'round';
     c.strokeText(words, x, y);
   }

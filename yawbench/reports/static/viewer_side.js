@@ -20,7 +20,7 @@ function loadSide(folder, key) {
 // The runs of several files as those of one viewer; the first has the views.
 function together(parts) {
   if (parts.length === 1) return parts[0];
-  const data = {...parts[0], grounds: [], runs: [], signals: {}, metrics: [], marks: [], limits: []};
+  const data = {...parts[0], grounds: [], runs: [], signals: {}, metrics: [], marks: [], limits: [], curves: [], why: []};
   const seen = new Set();
   for (const part of parts) {
     const before = data.grounds.length;
@@ -31,13 +31,14 @@ function together(parts) {
       if (!row) data.metrics.push(row = [title, data.runs.map(() => '')]);
       row[1].push(...values);
     }
-    const owner = part.dashed_of === null ? [] : [part.dashed_of + data.runs.length];
-    for (const kind of ['marks', 'limits']) {
-      for (const one of part[kind].map((dashed) => [...dashed, ...owner])) {
+    const moved = (run) => (run === null ? null : run + data.runs.length);
+    for (const kind of ['marks', 'limits', 'curves']) {
+      for (const one of part[kind].map((dashed) => [...dashed.slice(0, -1), moved(dashed.at(-1))])) {
         if (!seen.has(JSON.stringify(one))) data[kind].push(one);
         seen.add(JSON.stringify(one));
       }
     }
+    data.why.push(...part.why.map(([run, reasons, best]) => [moved(run), reasons.map(([says, time, of]) => [says, time, moved(of)]), moved(best)]));
     data.runs.push(...part.runs.map((run) => ({...run, road: run.road && {...run.road, ground: run.road.ground === null ? null : run.road.ground + before}})));
     for (const row of data.metrics) while (row[1].length < data.runs.length) row[1].push('');
   }
@@ -74,6 +75,7 @@ async function showSides(holder, contents, asked = null) {
     Object.assign(viewer.state, {panels: panels.filter((one) => viewer.known(one)), span, tolerance, difference: difference && data.runs.length > 1});
     if (viewer.axes().includes(x)) viewer.state.x = x;
     if (!viewer.state.panels.length) viewer.state.panels = viewer.initial().panels;
+    viewer.lasting = viewer.lasts(); // taken over, not a step of the reader
     viewer.refresh();
   }
   return viewer;

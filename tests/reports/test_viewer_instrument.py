@@ -1,0 +1,262 @@
+"""The viewer as an instrument: pin, peaks, zoom, pan, undo, touch, events, claims, pictures."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from urllib.parse import quote
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from tests.orchestrator.recorded import noted
+from tests.reports.browser import PHONE, Browser
+from tests.reports.made_up import whole_car
+from tests.reports.test_viewer import VIEWER, chart, drag, opened
+from yawbench.events.kinds import events_in
+from yawbench.figures.panels import LabelledRun
+from yawbench.orchestrator.results.reader import Results
+from yawbench.reports.planes import PLANES
+from yawbench.reports.viewer import Settings, page
+from yawbench.reports.viewer_views import Mark, View
+from yawbench.vocabulary.gravity import G
+
+A, B, C = "no control", "fuzzy", "held"
+SHOWN = ("sideslip", "yaw_rate", "acceleration_y")
+
+
+def spun() -> Results:
+    """Return a run whose sideslip grows to its end."""
+    run = whole_car()
+    return replace(run, columns={**run.columns, "plant.sideslip": np.linspace(0.0, 1.2, run.time.size)})
+
+
+@pytest.fixture(scope="module")
+def three(tmp_path_factory) -> Path:
+    """A page of three runs; the first is lost."""
+    file = tmp_path_factory.mktemp("instrument") / "three.html"
+    runs = [LabelledRun(A, spun()), LabelledRun(B, whole_car(2.0)), LabelledRun(C, whole_car(0.5))]
+    settings = Settings([View(panels=SHOWN)], marks=[Mark(1.0, "begin of B", 1)])
+    file.write_text(page(runs, settings), "utf-8")
+    return file
+
+
+STATE = VIEWER + "viewer.remember(); return viewer.state"
+
+
+def test_time_axis_and_cursor_time_stay_in_sight(chromium: Browser, three):
+    for width, height in ((1400, 500), (PHONE, 500)):
+        opened(chromium, three, width=width, height=height)
+        boxes = chromium.run(
+            VIEWER + "viewer.panels[1].root.scrollIntoView({block: 'center', behavior: 'instant'});"
+            "return ['axis', 'clock'].map((name) => viewer.find(name).getBoundingClientRect())"
+            ".map((box) => [box.top, box.bottom])"
+        )
+        assert all(0 <= top < bottom <= height for top, bottom in boxes), width
+        ends = chromium.run(
+            VIEWER + "viewer.zoomTo([1, 3]); const {x} = viewer.axis.plot.scales; return [x.min, x.max]"
+        )
+        assert ends == [1, 3] or chromium.run(VIEWER + "return viewer.span()") == [1, 3]
+
+
+def test_the_pin_gives_differences_in_time_and_value(chromium: Browser, three):
+    opened(chromium, three)
+    chromium.run(VIEWER + "viewer.seek(2); viewer.setPin(); viewer.seek(4.5); viewer.moveCursor();")
+    assert chromium.run(VIEWER + "return viewer.find('since').textContent") == "2.500 s since 2.000 s"
+    lines = chromium.run(
+        VIEWER + "const {shown, cells} = viewer.panels[0];"
+        "return shown.map(({run, reference}, k) => [run.number, reference, cells[k][1].textContent])"
+    )
+    run = spun()
+    rows = [int(np.argmin(np.abs(run.time - t))) for t in (2.0, 4.5)]
+    apart = np.degrees(run["plant.sideslip"][rows[1]] - run["plant.sideslip"][rows[0]])
+    (text,) = [text for number, reference, text in lines if number == 0 and not reference]
+    assert text.startswith("+") and float(text) == pytest.approx(apart, abs=0.01)
+    chromium.run(VIEWER + "viewer.setPin()")
+    assert chromium.run(STATE)["pin"] is None
+
+
+def test_the_peak_is_gone_to_and_one_at_the_end_is_still_growing(chromium: Browser, three):
+    opened(chromium, three)
+    peak = (
+        VIEWER + "viewer.panels[0].root.querySelector('[title^=\"Go to the peak\"]').click();"
+        "viewer.moveCursor(); return [viewer.state.time, viewer.panels[0].remark.textContent]"
+    )
+    time, said = chromium.run(peak)
+    assert time == 8 and A in said and said.endswith("still growing")
+    time, said = chromium.run(peak)
+    run = whole_car(2.0)
+    assert time == pytest.approx(run.time[np.argmax(np.abs(run["plant.sideslip"]))], abs=0.011)  # a row
+    assert B in said and "growing" not in said
+    told = chromium.run(
+        "return [...document.querySelectorAll('.yv-metric small')].map((one) => one.textContent)"
+    )
+    assert told == ["still growing"]
+
+
+def test_a_drag_upwards_zooms_a_panel_and_undo_and_back_take_it_back(chromium: Browser, three):
+    opened(chromium, three)
+    before = chromium.run(STATE)
+    drag(chromium, 1, (0.5, 0.2), (0.5, 0.7))
+    zoomed = chromium.run(STATE)
+    ((low, high),) = zoomed["heights"].values()
+    assert zoomed["span"] is None and low < high
+    chromium.run(VIEWER + "viewer.removePanel(viewer.state.panels[2]); viewer.remember();")
+    assert len(chromium.run(STATE)["panels"]) == 2
+    chromium.run("document.querySelector('.yv-undo').click()")
+    chromium.wait_for("document.querySelector('.yv').viewer.state.panels.length === 3")
+    assert chromium.run(STATE)["heights"] == zoomed["heights"]
+    chromium.run("history.back()")
+    chromium.wait_for("!Object.keys(document.querySelector('.yv').viewer.state.heights).length")
+    assert {**chromium.run(STATE), "time": 0} == {**before, "time": 0}
+    assert chromium.run("return document.querySelector('.yv-undo').disabled")
+    chromium.run("history.forward()")
+    chromium.wait_for("Object.keys(document.querySelector('.yv').viewer.state.heights).length")
+    chromium.run(VIEWER + "viewer.reset(); viewer.remember();")
+    assert {**chromium.run(STATE), "time": 0} == {**before, "time": 0}
+
+
+def test_a_drag_with_shift_pans(chromium: Browser, three):
+    opened(chromium, three)
+    chromium.run(VIEWER + "viewer.zoomTo([2, 4])")
+    drag(chromium, 0, (0.75, 0.5), (0.25, 0.5), keys=8)
+    begin, end = chromium.run(STATE)["span"]
+    assert (begin, end) == (pytest.approx(3.0, abs=0.03), pytest.approx(5.0, abs=0.03))
+
+
+def touch(chromium: Browser, kind: str, *points: tuple[float, float]) -> None:
+    chromium.driver.execute_cdp_cmd(
+        "Input.dispatchTouchEvent",
+        {"type": kind, "touchPoints": [{"x": x, "y": y, "id": k} for k, (x, y) in enumerate(points)]},
+    )
+
+
+def test_one_finger_moves_the_cursor_and_two_pinch(chromium: Browser, three):
+    opened(chromium, three, width=PHONE)
+    left, top, wide, high = chart(chromium, 1)
+    y = top + high / 2
+    touch(chromium, "touchStart", (left + 0.25 * wide, y))
+    touch(chromium, "touchMove", (left + 0.5 * wide, y))
+    touch(chromium, "touchEnd")
+    assert chromium.run(STATE)["time"] == pytest.approx(4.0, abs=0.1)
+    touch(chromium, "touchStart", (left + 0.4 * wide, y), (left + 0.6 * wide, y))
+    touch(chromium, "touchMove", (left + 0.3 * wide, y), (left + 0.7 * wide, y))
+    touch(chromium, "touchEnd")
+    begin, end = chromium.run(STATE)["span"]
+    assert end - begin == pytest.approx(4.0, rel=0.05) and (begin + end) / 2 == pytest.approx(4.0, abs=0.2)
+
+
+def test_panels_are_moved_enlarged_and_a_new_one_is_scrolled_to(chromium: Browser, three):
+    opened(chromium, three, height=500)
+    press = VIEWER + 'viewer.panels[arguments[0]].root.querySelector(`[title="${arguments[1]}"]`).click()'
+    chromium.run(press, 0, "Move down")
+    panels = chromium.run(STATE)["panels"]
+    assert [name.split(",")[0] for name in panels[:2]] == ["plant.yaw_rate", "plant.sideslip"]
+    height = VIEWER + "return viewer.panels[0].chart.clientHeight"
+    low = chromium.run(height)
+    chromium.run(press, 0, "Enlarge")
+    assert chromium.run(height) > 2 * low
+    box = chromium.run(
+        "scrollTo(0, 0);" + VIEWER + "const add = viewer.find('add'); add.value = 'velocity_x';"
+        "add.dispatchEvent(new Event('change'));"
+        "const box = viewer.panels.at(-1).root.getBoundingClientRect(); return [box.top, box.bottom]"
+    )
+    assert 0 <= box[0] < box[1] <= 500
+
+
+def test_events_are_listed_marked_and_gone_to_and_hidden_with_their_run(chromium: Browser, three):
+    opened(chromium, three)
+    chromium.run("document.querySelector('.yv-happened').open = true")
+    chromium.wait_for("document.querySelector('.yv-events button')")
+    past = next(event for event in events_in(spun()) if event.kind == "sideslip-past")
+    marks = VIEWER + "return viewer.panels[0].marks().map(({time, text}) => [time, text])"
+    assert [past.time, "sideslip past its bound"] in chromium.run(marks)
+    assert [1.0, "begin of B"] in chromium.run(marks)
+    why = "return [...document.querySelectorAll('.yv-why li')].map((one) => [one.hidden, one.textContent])"
+    ((hidden, text),) = chromium.run(why)
+    assert not hidden and text.startswith(f"{A}:") and f"passes 20 degrees at {past.time:.2f} s" in text
+    chromium.run(
+        "[...document.querySelectorAll('.yv-why a')].at(-1).click();" + VIEWER + "viewer.moveCursor()"
+    )
+    assert chromium.run(STATE)["time"] == pytest.approx(past.time, abs=1e-6)
+    assert chromium.run("return document.querySelector('.yv-why button').textContent") == f"beside {B}"
+    chromium.run("document.querySelector('.yv-why button').click()")
+    assert chromium.run(STATE)["shown"] == [0, 1]
+    chromium.run(VIEWER + "viewer.showRuns([0, 2], 0)")
+    assert [1.0, "begin of B"] not in chromium.run(marks)
+    chromium.run(VIEWER + "viewer.showRuns([1], 1)")
+    assert [past.time, "sideslip past its bound"] not in chromium.run(marks)
+    assert chromium.run(why)[0][0]
+
+
+def test_a_claim_shows_its_signal_with_bound_and_instant(chromium: Browser, three):
+    lit = quote(json.dumps(["plant.yaw_rate", 0.2, "Yaw rate: peak ≤ 11.5 °/s"]))
+    opened(chromium, three, f"run?shown=[1]&baseline=1&lit={lit}")
+    state = chromium.run(STATE)
+    run = whole_car(2.0)
+    peak = run.time[np.argmax(np.abs(run["plant.yaw_rate"]))]
+    assert state["time"] == pytest.approx(peak, abs=1e-6) and state["panels"][0].startswith("plant.yaw_rate")
+    said = chromium.run(
+        VIEWER + "const [panel] = viewer.panels; return [panel.root.className, panel.remark.textContent,"
+        " panel.limits().map(([bound]) => bound)]"
+    )
+    assert said == ["yv-panel yv-lit", "judged: Yaw rate: peak ≤ 11.5 °/s", [0.2, -0.2]]
+
+
+def test_every_run_has_its_own_reference(chromium: Browser, tmp_path):
+    first, second = whole_car(), whole_car(2.0)
+    second.columns["reference.yaw_rate_ref"] = 1.5 * second["reference.yaw_rate_ref"]
+    (file := tmp_path / "own.html").write_text(page([LabelledRun(A, first), LabelledRun(B, second)]), "utf-8")
+    opened(chromium, file)
+    drawn = VIEWER + (
+        "const panel = viewer.panels.find(({spec}) => spec.startsWith('plant.' + arguments[0]));"
+        "return panel.shown.filter(({reference}) => reference).map(({run}) => run.number)"
+    )
+    assert chromium.run(drawn, "yaw_rate") == [0, 1]
+    assert chromium.run(drawn, "sideslip") == [0]  # the same in both
+
+
+def test_the_picture_as_svg_has_titles_axis_legend_and_a_line_per_run(chromium: Browser, three):
+    opened(chromium, three, "run?difference=true")
+    text = chromium.run(VIEWER + "return viewer.drawing()")
+    svg = ElementTree.fromstring(text)
+    words = [one.text for one in svg.iter("{http://www.w3.org/2000/svg}text")]
+    assert words[0] == f"{B}, {C} minus {A}" and "t in s" in words
+    lines = [one for one in svg.iter("{http://www.w3.org/2000/svg}path") if len(one.get("d", "")) > 1000]
+    assert len(lines) == 2 * len(SHOWN)
+
+
+def test_the_command_draws_what_is_shown(chromium: Browser, tmp_path):
+    run = replace(whole_car(), folder=Path("results/one run"))
+    (file := tmp_path / "one.html").write_text(page([LabelledRun("x", run)]), "utf-8")
+    opened(chromium, file, 'run?panels=["plant.sideslip"]')
+    command = chromium.run(VIEWER + "viewer.tellCommand(); return viewer.find('command').textContent")
+    assert command == "yawbench plot 'results/one run' --panel plant.sideslip --format svg"
+
+
+def test_phase_planes_have_their_limits(chromium: Browser, tmp_path):
+    plant = {"name": "plant", "constants": {}}
+    tyre = {"name": "tyre", "constants": {"friction": 0.5}}
+    run = noted(whole_car(), fmus={"plant": plant, "tyre": tyre})
+    (file := tmp_path / "planes.html").write_text(page([LabelledRun(A, run)]), "utf-8")
+    opened(chromium, file)
+    titles = chromium.run(VIEWER + "return viewer.data.views.map(({title}) => title)")
+    number = titles.index(PLANES[1].title)
+    chromium.run(VIEWER + f"viewer.find('views').value = {number};"
+                 "viewer.find('views').dispatchEvent(new Event('change'))")  # fmt: skip
+    curves = chromium.run(VIEWER + "return viewer.curves('plant.yaw_rate').map(([, , ys]) => ys[0])")
+    held = 0.5 * G / float(run["plant.velocity_x"][0])
+    assert sorted(curves) == pytest.approx([-held, held])
+    assert chromium.console() == []
+
+
+def test_parts_of_a_page_hear_of_cursor_runs_and_colours(chromium: Browser, three):
+    opened(chromium, three)
+    heard = chromium.run(
+        VIEWER + "const heard = []; const end = viewer.subscribe((one) => heard.push(one));"
+        "viewer.state.time = 3; viewer.moveCursor(); viewer.showRuns([1], 1); end(); viewer.moveCursor();"
+        "return heard.map(({time, shown, colours}) => [time, shown.map(({label}) => label), colours.length])"
+    )
+    assert [heard[1], heard[-1]] == [[3, [A, B, C], 3], [3, [B], 1]]
