@@ -25,7 +25,6 @@ from yawbench.orchestrator.wiring.parameters import Parameters, is_parameter, of
 from yawbench.vocabulary.friction_table import table_of
 from yawbench.vocabulary.patches import patches_of
 from yawbench.vocabulary.signals import SYMBOLS
-from yawbench.vocabulary.vehicle import CAR
 from yawbench.vocabulary.wheels import WHEELS
 
 from .derivations import (
@@ -38,6 +37,7 @@ from .derivations import (
     contradictions,
     quantity_of,
 )
+from .quantities import CAR
 from .suspicious_values import suspicious_values
 
 if TYPE_CHECKING:
