@@ -14,7 +14,7 @@ from yawbench.orchestrator.results.reader import Results
 from yawbench.orchestrator.results.run_record import RunStatus
 from yawbench.scene.outline import outline_of, places_of
 from yawbench.scene.scene import POSE
-from yawbench.scene.wheel_motion import friction_columns
+from yawbench.scene.wheel_motion import friction_columns, travel_of
 from yawbench.vocabulary.wheels import WHEELS
 
 NAMED = 6
@@ -22,7 +22,7 @@ NAMED = 6
 
 MOTION = (
     "velocity_x", "velocity_y", "sideslip", "yaw_rate", "steer_angle", "yaw_moment", "cone_overrun",
-    "path_offset",
+    "path_offset", "roll_angle", "pitch_angle", "heave", "wind_force_y",
 )  # fmt: skip
 OF_WHEELS = ("force_along", "force_across", "load", "friction")
 """Signals of each wheel that `road_of` draws."""
@@ -57,7 +57,31 @@ def road_of(run: Results, grounds: list[Any]) -> dict[str, Any] | None:
     road["outline"] = {"car": asdict(car), "lanes": [list(lane) for lane in places.lanes]}
     road["ground"] = grounds.index(ground) if ground else None
     road["sized"] = known
+    if lifts := _lifts(run):
+        road["lifts"] = lifts
     return road
+
+
+LIFTED = 0.001
+"""Height [m] from which a wheel counts as lifted. Chosen: less is not seen."""
+PERIOD = 0.01
+"""Distance of the heights of a lifted wheel in a page [s]. Chosen: an eighth of the period of wheel hop."""
+
+
+def _lifts(run: Results) -> list[Any]:
+    """Return where wheels are in the air: wheel, first time, period [s], heights [m]."""
+    travel, found = travel_of(run), []
+    if travel is None:
+        return []
+    for wheel, heights in zip(WHEELS, travel.T, strict=True):
+        lifted = columns_of(run, f"vertical_load_{wheel}")
+        above = (run.columns[lifted[0]] <= 0.0) & (heights > LIFTED)
+        edges = np.flatnonzero(np.diff(above, prepend=False, append=False))
+        for first, after in zip(edges[::2], edges[1::2], strict=True):
+            times = np.arange(run.time[first], run.time[after - 1] + PERIOD, PERIOD)
+            height = np.interp(times, run.time[first:after], heights[first:after])
+            found.append([wheel, float(times[0]), PERIOD, [round(float(one), 3) for one in height]])
+    return found
 
 
 def without_tyres(road: Mapping[str, Any]) -> dict[str, Any]:

@@ -36,7 +36,7 @@ from .viewer_data import PackedRun, is_numeric, pack
 
 SCRIPTS = (
     "viewer_data.js", "viewer_panels.js", "viewer_draw.js", "viewer_scene.js", "viewer_close_up.js",
-    "viewer_road.js", "viewer.js", "viewer_side.js",
+    "viewer_space.js", "viewer_road.js", "viewer.js", "viewer_side.js",
 )  # fmt: skip
 SHEETS = ("uPlot.min.css", "viewer.css")
 MOST = 200

@@ -94,8 +94,8 @@ class Scene:
 
         A point of the body is at this plus its place in the car at rest, turned by pitch and roll.
         """
-        lifted = np.stack([0.0 * self.heave, 0.0 * self.heave, self.car.pivot + self.heave], axis=1)
-        return np.subtract(lifted, _turned(self.pitch, self.roll, self.car.pivot))
+        lifted: np.ndarray = np.stack([0.0 * self.heave, 0.0 * self.heave, self.car.pivot + self.heave], axis=1)
+        return lifted - _turned(self.pitch, self.roll, self.car.pivot)
 
     @cached_property
     def wheels(self) -> np.ndarray:

@@ -171,7 +171,7 @@ class Viewer extends InAddress {
   initial() {
     return {
       view: 0, ...this.viewed(0), span: null, time: this.data.still,
-      difference: false, tolerance: 0, camera: 'cars', near: 1, offsets: {},
+      difference: false, tolerance: 0, camera: 'cars', look: [0, 0], near: 1, offsets: {},
     };
   }
 
@@ -194,7 +194,8 @@ class Viewer extends InAddress {
       panels: (v) => Array.isArray(v) && v.every((n) => typeof n === 'string' && this.known(n)),
       span: (v) => v === null || (Array.isArray(v) && v.length === 2 && v.every(Number.isFinite) && v[0] < v[1]),
       time: Number.isFinite, difference: (v) => typeof v === 'boolean', tolerance: (v) => Number.isFinite(v) && v >= 0,
-      x: (v) => this.axes().includes(v), camera: (v) => v === 'cars' || v === 'whole' || isRun(v),
+      x: (v) => this.axes().includes(v), camera: (v) => ['cars', 'whole', ...CAMERAS].includes(v) || isRun(v),
+      look: (v) => Array.isArray(v) && v.length === 2 && v.every(Number.isFinite),
       near: (v) => v >= ZOOM[0] && v <= ZOOM[1],
       offsets: (v) => v && typeof v === 'object' && !Array.isArray(v) && Object.values(v).every(Number.isFinite),
     };
