@@ -24,7 +24,7 @@ MOTION = (
     "velocity_x", "velocity_y", "sideslip", "yaw_rate", "steer_angle", "yaw_moment", "cone_overrun",
     "path_offset", "roll_angle", "pitch_angle", "heave", "wind_force_y",
 )  # fmt: skip
-OF_WHEELS = ("force_along", "force_across", "load", "friction")
+OF_WHEELS = ("force_along", "force_across", "load", "friction", "spin")
 """Signals of each wheel that `road_of` draws."""
 
 
@@ -48,6 +48,8 @@ def road_of(run: Results, grounds: list[Any]) -> dict[str, Any] | None:
     if frictions is not None and along and loads:
         for wheel, load, friction in zip(WHEELS, loads, frictions, strict=True):
             road[f"load_{wheel}"], road[f"friction_{wheel}"] = load, friction
+    for wheel, column in zip(WHEELS, columns_of(run, "wheel_speed_*"), strict=False):
+        road[f"spin_{wheel}"] = column
     car, known = outline_of(run)
     x, y = (run.columns[road[key]] for key in ("x", "y"))
     places = places_of(run, *((float(np.nanmin(values)), float(np.nanmax(values))) for values in (x, y)))

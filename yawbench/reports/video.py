@@ -1,7 +1,7 @@
-"""A video of runs as the pages draw them: frames of the scene of a page, taken in a browser without a window.
+"""A video of runs as the pages draw them: frames of a page's scene, from a browser without a window.
 
-A page's script draws every frame, so that a video shows what the page shows. Needs Chromium, its driver and the
-package selenium; nothing is downloaded.
+A page's script draws every frame, so that a video shows what the page shows. Needs Chromium, its driver and
+the package selenium; nothing is downloaded.
 """
 
 from __future__ import annotations

@@ -94,8 +94,10 @@ class Scene:
 
         A point of the body is at this plus its place in the car at rest, turned by pitch and roll.
         """
-        lifted: np.ndarray = np.stack([0.0 * self.heave, 0.0 * self.heave, self.car.pivot + self.heave], axis=1)
-        return lifted - _turned(self.pitch, self.roll, self.car.pivot)
+        none = np.zeros_like(self.heave)
+        lifted: np.ndarray = np.stack([none, none, self.car.pivot + self.heave], axis=1)
+        place: np.ndarray = lifted - _turned(self.pitch, self.roll, self.car.pivot)
+        return place
 
     @cached_property
     def wheels(self) -> np.ndarray:
@@ -115,7 +117,7 @@ class Scene:
     @cached_property
     def contacts(self) -> np.ndarray:
         """Points below the wheels on the road at which forces act, car frame [m], shape (rows, 4, 3)."""
-        points = self.wheels.copy()
+        points: np.ndarray = self.wheels.copy()
         if self.car.wheels_turn:  # all the way down, see `cars.ride`
             points[:, :, 0] -= self.car.radius * self.pitch[:, None]
             points[:, :, 1] += self.car.radius * self.roll[:, None]

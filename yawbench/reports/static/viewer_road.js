@@ -13,6 +13,10 @@ function channelsOf(run) {
     const off = column('path_offset');
     channels.path_y = channels.y.map((y, i) => y - off[i]);
   }
+  for (const wheel of WHEELS.filter((one) => road['spin_' + one])) {
+    let turned = 0;
+    channels['turned_' + wheel] = column('spin_' + wheel).map((speed, i) => (turned += i ? speed * (run.time[i] - run.time[i - 1]) : 0));
+  }
   for (const wheel of WHEELS) {
     if (!road['force_along_' + wheel]) break;
     const [fx, fy] = [column('force_along_' + wheel), column('force_across_' + wheel)];

@@ -13,6 +13,7 @@ const SEEN = 90; // how far ground and cones are drawn [m]; chosen: beyond, they
 const FIELD = 1.1; // width of the picture over its distance; chosen: an angle of 58 degrees
 const AT_GRIP = 0.95; // share of the grip from which a force counts as at its limit; chosen: that of the events
 const CONE = [0.15, 0.6]; // radius and height [m]; chosen: a cone of 0.6 m
+const DEEP = 1; // by how much a car's parts are moved apart, where the order of their depths would be wrong [m]
 const LIGHT = [0.36, 0.48, 0.8]; // towards the sun
 const HOT = '#d6006c';
 
@@ -81,7 +82,9 @@ class Painter {
 
   fill(points, colour) {
     const seen = this.eye.before(points);
-    if (seen.length > 2) filled(this.context, colour, seen.map((point) => this.eye.flat(point)));
+    if (seen.length < 3) return false;
+    filled(this.context, colour, seen.map((point) => this.eye.flat(point)));
+    return true;
   }
 
   // A line, without what lies beside the picture: dashes of long lines would take long.
@@ -99,27 +102,26 @@ class Painter {
     stroke(c, colour, width, 1, dash);
   }
 
-  // A flat face of a solid, seen from outside alone.
-  face(points, rgb, alpha) {
+  // A flat face of a solid, seen from outside alone; painted as if it were `behind` by that much [m].
+  face(points, rgb, alpha, behind = 0) {
     const {eye} = this;
     const normal = unit(cross(minus(points[1], points[0]), minus(points[2], points[0])));
     if (dot(normal, minus(eye.from, points[0])) <= 0) return;
     const bright = 0.7 + 0.35 * Math.max(dot(normal, LIGHT), 0);
     const colour = `rgb(${rgb.map((part) => Math.round(Math.min((part + 12) * bright, 255))).join(' ')} / ${alpha})`;
-    const depth = points.reduce((sum, point) => sum + eye.seen(point)[2], 0) / points.length;
+    const depth = points.reduce((sum, point) => sum + eye.seen(point)[2], 0) / points.length + behind;
     this.solids.push([depth, () => {
-      this.fill(points, colour);
-      if (alpha === 1) stroke(this.context, colour, 0.7, 1); // closes the gaps between faces
+      if (this.fill(points, colour) && alpha === 1) stroke(this.context, colour, 0.7, 1); // closes the gaps between faces
     }]);
   }
 
   // A solid between two rings of points, counter-clockwise seen from the second, which closes it.
-  solid(low, high, rgb, alpha, lid = true) {
+  solid(low, high, rgb, alpha, {lid = true, behind = 0} = {}) {
     low.forEach((point, i) => {
       const j = (i + 1) % low.length;
-      this.face([point, low[j], high[j], high[i]], rgb, alpha);
+      this.face([point, low[j], high[j], high[i]], rgb, alpha, behind);
     });
-    if (lid) this.face(high, rgb, alpha);
+    if (lid) this.face(high, rgb, alpha, behind);
   }
 
   arrow(from, along, colour, width) {
@@ -242,26 +244,28 @@ function paintCar(p, run, state, {ghost, scale, strongest, time}) {
   const belt = level(f - 0.12, r - 0.06, 0.96 * w, Math.max(arch, 0.5 * h) + 0.01, Math.max(arch, 0.6 * h) + 0.02);
   const cabin = level(0.5 * car.front_axle, car.rear_axle + 0.3 * (r - car.rear_axle), 0.9 * w, 0.53 * h, 0.6 * h);
   const roof = level(0.5 * car.front_axle - 0.42 * h, car.rear_axle - 0.12 * h, 0.72 * w, h, 0.98 * h);
-  p.solid(sill, low, rgb.map((one) => 0.6 * one), alpha, false);
-  p.solid(low, middle, rgb, alpha, false);
-  p.solid(middle, belt, rgb, alpha);
-  p.solid(cabin, roof, [96, 110, 122], alpha, false);
-  p.face(roof, rgb, alpha);
+  p.solid(sill, low, rgb.map((one) => 0.6 * one), alpha, {lid: false, behind: DEEP});
+  p.solid(low, middle, rgb, alpha, {lid: false, behind: DEEP});
+  p.solid(middle, belt, rgb, alpha, {behind: -DEEP});
+  p.solid(cabin, roof, [96, 110, 122], alpha, {lid: false, behind: -1.5 * DEEP});
+  p.face(roof, rgb, alpha, -1.5 * DEEP);
   const wheels = wheelsOf(car);
+  const beside = dot(minus(p.eye.from, place([0, 0, 0])), [-Math.sin(yaw), Math.cos(yaw), 0]); // the eye, to the left
   const down = car.wheels_turn ? car.pivot - car.radius : 0;
   for (const [name, [x, y]] of Object.entries(wheels)) {
     const at = placing([x - down * pitch, y + down * roll, car.radius + liftOf(run, name, time)], name[0] === 'f' ? state.steer : 0, 0, 0.7 * roll);
-    const turned = state['wheel_turn_' + name] || 0;
+    const turned = state['turned_' + name] || 0;
     const disc = (across, radius) => TREAD.map(([a, b]) => place(at([radius * a, across, radius * b])));
     const outside = Math.sign(y);
     const [inside, outer] = [disc(-0.1 * outside, car.radius), disc(0.1 * outside, car.radius)];
+    const behind = outside * beside > 0 ? 0 : 2 * DEEP; // those on the other side are hidden by the body
     const order = outside > 0 ? (points) => [...points].reverse() : (points) => points;
-    p.solid(order(inside), order(outer), [52, 52, 54], alpha);
-    p.face(order(disc(0.105 * outside, 0.6 * car.radius)), [176, 178, 182], alpha);
+    p.solid(order(inside), order(outer), [52, 52, 54], alpha, {behind});
+    p.face(order(disc(0.105 * outside, 0.6 * car.radius)), [176, 178, 182], alpha, behind);
     if (!ghost) p.face(order(TREAD.slice(0, 9).map(([a, b]) => {
-      const [cos, sin] = [Math.cos(turned), Math.sin(turned)];
+      const [cos, sin] = [Math.cos(turned), -Math.sin(turned)];
       return place(at([0.58 * car.radius * (a * cos - b * sin), 0.108 * outside, 0.58 * car.radius * (a * sin + b * cos)]));
-    })), [120, 122, 126], alpha);
+    })), [120, 122, 126], alpha, behind);
   }
   return () => paintForces(p, run, state, {place, wheels, down: car.wheels_turn ? car.pivot : 0, ghost, scale, strongest});
 }
