@@ -13,7 +13,8 @@ from yawbench.commands.output import say
 from yawbench.commands.recorded_runs import Labels, RunSources, folder_of_all, labels_of, read_runs, recorded
 
 To = Annotated[
-    str, typer.Option("--to", metavar="FORMAT", help="rerun, mcap, mdf, parquet, csv or mat.", show_default=False)
+    str,
+    typer.Option("--to", metavar="FORMAT", help="rerun, mcap, mdf, parquet, csv or mat.", show_default=False),
 ]
 File = Annotated[
     Path | None,
@@ -22,9 +23,7 @@ File = Annotated[
 
 
 @takes(*CHANGES, "fmus", "no_build")
-def export(
-    sources: RunSources, options: RunOptions, to: To, label: Labels = None, out: File = None
-) -> None:
+def export(sources: RunSources, options: RunOptions, to: To, label: Labels = None, out: File = None) -> None:
     """Write runs as one file for another program, with all signals and their units.
 
     rerun, mcap: the scene in three dimensions with all cars, forces, lanes and ground, the signals, the

@@ -45,14 +45,15 @@ class Format:
             except ImportError:
                 how = f"pip install 'yawbench[{self.extra}]'"
                 raise ResultsError(
-                    f"{self.says} needs the package {package.partition('.')[0]}: {how}", code="package-missing"
+                    f"{self.says} needs the package {package.partition('.')[0]}: {how}",
+                    code="package-missing",
                 ) from None
 
 
 FORMATS = {
-    "rerun": Format(".rrd", "a recording of Rerun", "rerun:write", ("rerun",), "rerun"),
+    "rerun": Format(".rrd", "a recording of Rerun", "rerun_file:write", ("rerun",), "rerun"),
     "mcap": Format(
-        ".mcap", "MCAP", "mcap:write", ("mcap", "mcap_protobuf", "foxglove_schemas_protobuf"), "mcap"
+        ".mcap", "MCAP", "mcap_file:write", ("mcap", "mcap_protobuf", "foxglove_schemas_protobuf"), "mcap"
     ),
     "mdf": Format(".mf4", "ASAM MDF", "tables:write_mdf", ("asammdf",), "mdf"),
     "parquet": Format(".parquet", "Apache Parquet", "tables:write_parquet"),

@@ -59,13 +59,15 @@ def _table(runs: Sequence[ExportedRun]) -> Any:
         rows, signals = run.results.time.size, run.signals
         columns = {"run": pa.array([run.label] * rows), "time": column_of(run.results.time)}
         columns |= {
-            name: column_of(signals[name]) if name in signals else pa.nulls(rows, pa.float64()) for name in units
+            name: column_of(signals[name]) if name in signals else pa.nulls(rows, pa.float64())
+            for name in units
         }
         parts.append(pa.table(columns))
     table = pa.concat_tables(parts)
     texts = {"run": "", "time": "s", **units}
     fields = [
-        field.with_metadata({"unit": texts[field.name]}) if texts[field.name] else field for field in table.schema
+        field.with_metadata({"unit": texts[field.name]}) if texts[field.name] else field
+        for field in table.schema
     ]
     return table.cast(pa.schema(fields))
 
@@ -77,7 +79,8 @@ def _unit(field: Any) -> str:
 def write_mdf(runs: Sequence[ExportedRun], file: Path) -> list[Path]:
     """Write a group of channels per run, named by its label."""
     groups = [
-        MdfGroup(run.label, run.title, run.results.time, run.results.columns, run.results.units) for run in runs
+        MdfGroup(run.label, run.title, run.results.time, run.results.columns, run.results.units)
+        for run in runs
     ]
     write_whole(file, mdf_of(groups, runs[0].results.record.started), named=True)
     return []
