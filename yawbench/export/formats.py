@@ -20,7 +20,7 @@ from yawbench.orchestrator.scenario.overrides import with_changes
 from yawbench.scene.scene import Scene, scene_of
 
 FRAMES = 0.02
-"""Time between two positions of a car in viewers [s]. Chosen: 50 frames a second; signals keep all samples."""
+"""Time between two positions of a car in viewers [s]. Chosen: 50 frames a second."""
 
 
 @dataclass(frozen=True)
@@ -39,15 +39,14 @@ class Format:
         Raises:
             ResultsError: one is not installed.
         """
-        for package in self.packages:
-            try:
+        try:
+            for package in self.packages:
                 importlib.import_module(package)
-            except ImportError:
-                how = f"pip install 'yawbench[{self.extra}]'"
-                raise ResultsError(
-                    f"{self.says} needs the package {package.partition('.')[0]}: {how}",
-                    code="package-missing",
-                ) from None
+        except ImportError as missing:
+            how = f"pip install 'yawbench[{self.extra}]'"
+            raise ResultsError(
+                f"{self.says} needs the package {missing.name}: {how}", code="package-missing"
+            ) from None
 
 
 FORMATS = {

@@ -61,7 +61,7 @@ def write(runs: Sequence[ExportedRun], file: Path) -> list[Path]:
     from mcap_protobuf.schema import register_schema
 
     sink = io.BytesIO()
-    writer = Writer(sink, compression=CompressionType.ZSTD)
+    writer: Any = Writer(sink, compression=CompressionType.ZSTD)
     writer.start(profile="", library="yawbench")
     writer.add_metadata("runs", {run.label: run.title for run in runs})
     scenes = [(number, run.label, run.scene) for number, run in enumerate(runs) if run.scene is not None]
@@ -185,7 +185,7 @@ def _paint(colour: Any, rgb: Sequence[float], alpha: float = 1.0) -> None:
     colour.r, colour.g, colour.b, colour.a = (*map(float, rgb), alpha)
 
 
-def _turn(quaternion: Any, turn: Sequence[float]) -> None:
+def _turn(quaternion: Any, turn: Sequence[float] | np.ndarray) -> None:
     quaternion.x, quaternion.y, quaternion.z, quaternion.w = map(float, turn)
 
 
@@ -275,7 +275,7 @@ def _moving(label: str, scene: Scene, colour: Colour) -> Iterator[tuple[int, byt
             if grip > 0:
                 angle = np.linspace(0.0, 2 * np.pi, 33)
                 round_ = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle]) * grip * PER_NEWTON
-                _line(entity, contact + [0, 0, 0.02] + round_, colour, 0.02)
+                _line(entity, round_ + contact + np.array([0.0, 0.0, 0.02]), colour, 0.02)
         yield _nanoseconds(time), transforms.SerializeToString(), update.SerializeToString()
 
 
@@ -317,8 +317,11 @@ def _layout(runs: Sequence[ExportedRun], scene: bool) -> dict[str, Any]:
             name = f"Plot!{signal}"
             unit = next(run.unit_of(c) for run in runs for c in columns_of(run.results, signal)[:1])
             panels[name] = {
-                "title": f"{signal} [{unit or '1'}]", "paths": paths, "showLegend": True, "xAxisVal": "timestamp",
-            }  # fmt: skip
+                "title": f"{signal} [{unit or '1'}]",
+                "paths": paths,
+                "showLegend": True,
+                "xAxisVal": "timestamp",
+            }
             plots.append(name)
     panels["Log!events"] = {"topicToRender": "/events"}
     right: Any = _stacked([*plots, "Log!events"])

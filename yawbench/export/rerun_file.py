@@ -11,6 +11,7 @@ Nothing listens to a network: the recording is a file.
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -52,10 +53,19 @@ TIME = "time"
 
 def write(runs: Sequence[ExportedRun], file: Path) -> list[Path]:
     """Write a recording."""
+    with tempfile.TemporaryDirectory(prefix="yawbench-") as folder:
+        recorded = Path(folder) / "runs.rrd"
+        _record(runs, recorded)
+        write_whole(file, recorded.read_bytes(), named=True)
+    return []
+
+
+def _record(runs: Sequence[ExportedRun], file: Path) -> None:
     import rerun as rr
 
     recording = rr.RecordingStream("yawbench", recording_id="-".join(run.label for run in runs))
-    memory = recording.memory_recording()
+    first = next((run.label for run in runs if run.scene is not None), None)
+    recording.save(file, default_blueprint=_layout(runs, first))
     scenes = [(number, run.label, run.scene) for number, run in enumerate(runs) if run.scene is not None]
     if scenes:
         recording.log("/", rr.ViewCoordinates.FLU, static=True)
@@ -70,11 +80,8 @@ def write(runs: Sequence[ExportedRun], file: Path) -> list[Path]:
         recording.reset_time()
     answer = rr.TextDocument(_answer(runs), media_type="text/markdown")
     recording.log("answer", answer, static=True)
-    first = next((label for _, label, _ in scenes), None)
-    recording.send_blueprint(_layout(runs, first))
-    data = memory.drain_as_bytes()
-    write_whole(file, data, named=True)
-    return []
+    recording.flush()
+    del recording  # which closes its file
 
 
 def _part(label: str) -> str:
@@ -180,8 +187,8 @@ def _car(recording: Any, base: str, scene: Scene, colour: Colour, alpha: int) ->
     if scene.yaw_moment.any():
         arcs = [arc_of(float(scene.yaw_moment[row]), scene.car.height + 0.1) for row in rows]
         moving(f"{base}/yaw_moment", rr.LineStrips3D.columns(strips=arcs))
-        looks = rr.LineStrips3D.from_fields(colors=[(90, 90, 90)], radii=[0.05])
-        recording.log(f"{base}/yaw_moment", looks, static=True)
+        grey = rr.LineStrips3D.from_fields(colors=[(90, 90, 90)], radii=[0.05])
+        recording.log(f"{base}/yaw_moment", grey, static=True)
     path = scene.position[samples(scene.time, 2 * FRAMES)]
     strip = np.column_stack([path, np.full(len(path), 0.03)])
     line = rr.LineStrips3D([strip], colors=[_rgb(colour)], radii=[0.04])
@@ -229,7 +236,7 @@ def _layout(runs: Sequence[ExportedRun], first: str | None) -> Any:
     told = rrb.Horizontal(
         rrb.TextDocumentView(origin="answer", name="answer"), rrb.TextLogView(origin="events", name="events")
     )
-    columns = [rrb.Vertical(*plots)] if plots else []
+    columns: list[Any] = [rrb.Vertical(*plots)] if plots else []
     if first is not None:
         follow = rrb.EyeControls3D(
             position=(-8.0, -4.0, 4.5),

@@ -69,7 +69,7 @@ def boxes_of(car: CarOutline) -> list[Box]:
 
 
 class Frame(NamedTuple):
-    """A moving frame: its name and that of its parent, its place there [m], (rows, 3), its turn, (rows, 4)."""
+    """A moving frame: its name, its parent, its place there [m], (rows, 3), and turn, (rows, 4)."""
 
     name: str
     parent: str
@@ -89,7 +89,7 @@ def frames_of(label: str, scene: Scene, rows: np.ndarray, parent: str) -> Iterat
 
 
 class Arrows(NamedTuple):
-    """Arrows of a kind in the frame of a car: origins and vectors [m], (rows, n, 3), colours, (rows, n, 3)."""
+    """Arrows in the frame of a car: origins and vectors [m], and colours, shape (rows, n, 3) each."""
 
     kind: str
     origins: np.ndarray
@@ -107,7 +107,7 @@ def arrows_of(scene: Scene, rows: np.ndarray, colour: Colour) -> Iterator[Arrows
 
     used = np.nan_to_num(scene.used[rows])[:, :, None]
     tints = np.where(used > AT_GRIP, np.array(HOT), np.array(CALM))
-    yield Arrows("forces", contacts + [0, 0, 0.05], force * PER_NEWTON * [1, 1, 0], tints, 0.09)
+    yield Arrows("forces", contacts + np.array([0.0, 0.0, 0.05]), force * PER_NEWTON * [1, 1, 0], tints, 0.09)
     yield Arrows("loads", contacts, force * PER_NEWTON * [0, 0, 0.5], alike((0.45, 0.45, 0.45), 4), 0.04)
     above = np.broadcast_to([0.0, 0.0, scene.car.height + 0.15], (n, 1, 3))
     speed = np.zeros((n, 1, 3))

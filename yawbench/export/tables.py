@@ -1,9 +1,9 @@
 """Runs as tables: CSV, Apache Parquet, ASAM MDF 4 and MATLAB files.
 
 CSV and Parquet have a row per run and instant; `run` is the label. CSV names units in its header,
-`plant.yaw_rate [rad/s]`, Parquet in the metadata of fields. MDF has a group of channels per run. A MATLAB file has
-a structure per run: `r.plant.yaw_rate`, with units in `r.units.plant.yaw_rate`. What a run has not recorded is
-missing there.
+`plant.yaw_rate [rad/s]`, Parquet in the metadata of fields. MDF has a group of channels per run. A MATLAB
+file has a structure per run: `r.plant.yaw_rate`, with units in `r.units.plant.yaw_rate`. What a run has not
+recorded is missing there.
 """
 
 from __future__ import annotations
@@ -73,7 +73,8 @@ def _table(runs: Sequence[ExportedRun]) -> Any:
 
 
 def _unit(field: Any) -> str:
-    return (field.metadata or {}).get(b"unit", b"").decode()
+    unit: bytes = (field.metadata or {}).get(b"unit", b"")
+    return unit.decode()
 
 
 def write_mdf(runs: Sequence[ExportedRun], file: Path) -> list[Path]:
@@ -112,7 +113,7 @@ def write_mat(runs: Sequence[ExportedRun], file: Path) -> list[Path]:
         savemat(data, content, long_field_names=True, do_compression=True)
     except (MatWriteError, OverflowError):
         raise ResultsError(
-            f"{file}: a MATLAB file holds 2 GB a variable at most; record fewer signals, or take --to parquet",
+            f"{file}: a MATLAB file holds 2 GB a variable at most; record less, or take --to parquet",
             code="results-unwritable",
         ) from None
     write_whole(file, data.getvalue(), named=True)
@@ -120,7 +121,7 @@ def write_mat(runs: Sequence[ExportedRun], file: Path) -> list[Path]:
 
 
 def _identifier(name: str, taken: Any = ()) -> str:
-    """Return a name as MATLAB allows it: letters, digits and _, a letter first; unlike those that are taken."""
+    """Return a name as MATLAB allows it, unlike those taken: letters, digits and _, a letter first."""
     text = re.sub(r"[^A-Za-z0-9_]", "_", name)
     text = (text if text[:1].isalpha() else f"r_{text}")[: LONGEST - 4]
     number = 2
