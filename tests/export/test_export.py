@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import json
-import shutil
+import socket
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import numpy as np
 import pyarrow.csv
 import pyarrow.parquet
 import pytest
+from PIL import Image
 
 import yawbench as yb
 from tests.command_line import status_of
@@ -22,6 +22,7 @@ from yawbench.export.tables import _identifier
 from yawbench.orchestrator.results.reader import load_results
 
 LABELS = ("lane change", "sine")
+RERUN = (sys.executable, "-m", "rerun_cli")
 READ = 0.5
 """Processor time of reading a run from MDF [s]."""
 
@@ -179,12 +180,8 @@ def rrd(folders, tmp_path_factory):
 
 
 def test_a_recording_of_rerun_has_cars_signals_and_a_layout(rrd, runs):
-    import rerun
-
-    program = str(Path(rerun.__file__).parents[2] / "rerun_cli" / "rerun")
-    if not Path(program).exists():
-        program = shutil.which("rerun") or str(Path(sys.executable).with_name("rerun"))
-    printed = subprocess.run([program, "rrd", "print", str(rrd)], capture_output=True, text=True, check=True)
+    command = [*RERUN, "rrd", "print", str(rrd)]
+    printed = subprocess.run(command, capture_output=True, text=True, check=True)
     text = printed.stdout + printed.stderr
     for path in (
         "/cars/lane_change/body",
@@ -200,6 +197,36 @@ def test_a_recording_of_rerun_has_cars_signals_and_a_layout(rrd, runs):
     assert "ViewBlueprint" in text and f"{len(runs[1])} rows" in text
 
 
+def test_rerun_draws_the_recording_without_a_window(rrd, tmp_path):
+    from rerun.experimental import ViewerClient
+
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    command = [*RERUN, "--headless", "--bind", "127.0.0.1", "--port", str(port), "--window-size", "1200x800"]
+    said, picture = tmp_path / "said.txt", tmp_path / "rerun.png"
+    with (
+        said.open("w") as stream,
+        subprocess.Popen([*command, str(rrd)], stdout=stream, stderr=stream) as viewer,
+    ):
+        try:
+            colours = set()
+            for _ in range(20):
+                time.sleep(2.0)
+                if viewer.poll() is not None:
+                    assert "graphics adapter" in said.read_text() or "render context" in said.read_text()
+                    pytest.skip("no graphics adapter: Debian has one without hardware, mesa-vulkan-drivers")
+                ViewerClient(f"rerun+http://127.0.0.1:{port}/proxy").save_screenshot(str(picture))
+                with Image.open(picture) as image:
+                    colours = {colour[:3] for _, colour in image.convert("RGB").getcolors(10**6)}
+                if len(colours & {(0, 114, 178), (213, 94, 0)}) == 2:
+                    break
+            assert {(0, 114, 178), (213, 94, 0)} <= colours  # the curves of both runs
+            assert (235, 235, 235) in colours  # the road
+        finally:
+            viewer.kill()
+
+
 def test_what_cannot_be_exported_is_said_in_a_sentence(folders, tmp_path, capsys, monkeypatch):
     assert status_of("export", folders[0], "--to", "excel") == 2
     assert mentions(capsys.readouterr().err, "--to excel", "parquet")
@@ -208,5 +235,5 @@ def test_what_cannot_be_exported_is_said_in_a_sentence(folders, tmp_path, capsys
     assert status_of("export", folders[0], "--to", "lost") == 2
     assert mentions(capsys.readouterr().err, "no_such_package", "yawbench[none]")
     (tmp_path / "file").write_text("")
-    assert status_of("export", folders[0], "--to", "csv", "--out", tmp_path / "file" / "a.csv") == 1
+    assert status_of("export", folders[0], "--to", "csv", "--out", tmp_path / "file" / "a.csv") == 2
     assert mentions(capsys.readouterr().err, "a.csv")

@@ -81,7 +81,7 @@ def write(runs: Sequence[ExportedRun], file: Path) -> list[Path]:
             _car(still, label, scene, colour, GHOST if number else 1.0)
             for time, frames, moving in _moving(label, scene, colour):
                 messages += [(time, to_tf, frames), (time, to_scene, moving)]
-        messages.append((begin - 1 if begin else 0, to_scene, still.SerializeToString()))
+        messages.insert(0, (begin, to_scene, still.SerializeToString()))
     to_log = channel("/events", Log)
     for run in runs:
         for event in run.events:
