@@ -43,7 +43,6 @@ from yawbench.scene.outline import CarOutline, Places
 from yawbench.scene.scene import Scene
 from yawbench.studies.tables import Cell, Column, Kind, Table
 from yawbench.vocabulary.lane_change import Lane
-from yawbench.vocabulary.patches import Point
 
 from ._controller import ControllerLike, Numbers
 
@@ -72,7 +71,6 @@ __all__ = [
     "OriginKind",
     "OverrideOrigin",
     "Places",
-    "Point",
     "Relation",
     "Results",
     "RunRecord",

@@ -24,7 +24,7 @@ class FrictionPatch(NamedTuple):
     """A polygon of constant friction."""
 
     friction: float
-    corners: tuple[Point, ...]
+    corners: tuple[tuple[float, float], ...]
 
 
 def ground_of(parameters: Mapping[str, Any], x: Bounds, y: Bounds) -> list[FrictionPatch]:
