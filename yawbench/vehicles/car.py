@@ -37,7 +37,7 @@ from .derivations import (
     contradictions,
     quantity_of,
 )
-from .quantities import CAR
+from .quantities import BODY, CAR
 from .suspicious_values import suspicious_values
 
 if TYPE_CHECKING:
@@ -138,7 +138,7 @@ class CarParameters(Parameters):
             for instance in self.takers(name):
                 self.give(instance, name, given, f"{instance}.{name} = {formula}: ")
         for name in idle:
-            if name not in self._car.used and self._of_car[name].changed:
+            if name not in self._car.used and name not in BODY and self._of_car[name].changed:
                 sentence = f"vehicle.{name} changes nothing: no instance takes it or what follows"
                 self.system.note("value-unused", sentence)
 
