@@ -25,6 +25,7 @@ LAYERS = (
     "yawbench.measurements",
     "yawbench.vehicles",
     "yawbench.metrics",
+    "yawbench.scene",
     "yawbench.events",
     "yawbench.figures",
     "yawbench.tyre_stand",

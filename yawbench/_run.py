@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
+    from yawbench.scene.scene import Scene
     from yawbench.studies.tables import Table
 
 
@@ -123,6 +124,21 @@ class Run:
             raise TypeError(f"best: must be a Run (got {short(best)})")
         beside = None if best is None else events_in(best.results)
         return [str(reason) for reason in why(events_in(self.results), beside)]
+
+    def scene(self) -> Scene:
+        """Return the run in space: car, body, wheels, forces, lanes, ground, events; axes of ISO 8855.
+
+            >>> scene = run.scene()
+            >>> scene.position.shape, scene.force.shape  # x and y of the car; four wheels, x, y and z
+            ((8001, 2), (8001, 4, 3))
+
+        Raises:
+            ResultsError: position or yaw angle were not recorded.
+        """
+        from yawbench.events.kinds import events_in
+        from yawbench.scene.scene import scene_of
+
+        return scene_of(self.results, events_in(self.results))
 
     @property
     def changes(self) -> tuple[Override, ...]:

@@ -30,9 +30,9 @@ from yawbench.orchestrator.scenario import catalogue
 from yawbench.orchestrator.scenario.overrides import faults_at, setting, with_changes
 from yawbench.orchestrator.scenario.schema import LoadedScenario
 from yawbench.orchestrator.signal_names import Target
+from yawbench.vehicles.quantities import CAR
 from yawbench.vocabulary.facts import FACTS
 from yawbench.vocabulary.roles import role_of
-from yawbench.vocabulary.vehicle import CAR
 
 from . import arguments
 from ._controller import ControllerLike, PythonComponent

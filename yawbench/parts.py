@@ -10,6 +10,7 @@ CORE = (
 WINGS = (
     "yawbench.bench",
     "yawbench.cluster",
+    "yawbench.export",
     "yawbench.interop",
     "yawbench.linear",
     "yawbench.measured_cars",

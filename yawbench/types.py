@@ -35,37 +35,47 @@ from yawbench.orchestrator.plan import (
     Wire,
 )
 from yawbench.orchestrator.results.reader import Results
-from yawbench.orchestrator.results.run_record import RunRecord
+from yawbench.orchestrator.results.run_record import EventRecord, RunRecord
 from yawbench.orchestrator.signal_names import SignalName, Target, TargetKind
 from yawbench.proving_ground.standard_tests import TestName
+from yawbench.scene.ground import FrictionPatch
+from yawbench.scene.outline import CarOutline, Places
+from yawbench.scene.scene import Scene
 from yawbench.studies.tables import Cell, Column, Kind, Table
+from yawbench.vocabulary.lane_change import Lane
 
 from ._controller import ControllerLike, Numbers
 
 __all__ = [
     "BuildInfo",
+    "CarOutline",
     "Causality",
     "Cell",
     "Column",
     "ControllerLike",
+    "EventRecord",
     "Fault",
     "FaultList",
     "FaultLocation",
     "FaultName",
     "FaultySignal",
     "Fmu",
+    "FrictionPatch",
     "Given",
     "InputSeries",
     "Instance",
     "Kind",
+    "Lane",
     "Messages",
     "Numbers",
     "OriginKind",
     "OverrideOrigin",
+    "Places",
     "Relation",
     "Results",
     "RunRecord",
     "RunsAs",
+    "Scene",
     "Severity",
     "SignalName",
     "SourceKind",

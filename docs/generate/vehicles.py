@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from yawbench.vehicles import derivations
 from yawbench.vehicles.derivations import DERIVATIONS
+from yawbench.vehicles.quantities import CAR
 from yawbench.vocabulary import vehicle
-from yawbench.vocabulary.vehicle import CAR, VehicleQuantity
+from yawbench.vocabulary.vehicle import VehicleQuantity
 
 from .text import NOTE, cell, code, docstring, table
 

@@ -10,7 +10,7 @@ import uuid
 from dataclasses import dataclass, field
 from datetime import datetime, timezone
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -54,6 +54,9 @@ class Watch(Protocol):
 
     def events(self) -> list[EventRecord] | None:
         """Return the events so far, in the order of their begin; None if it does not look for them."""
+
+    def geometry(self) -> dict[str, Any]:
+        """Return where the run takes place as plain data, empty if nothing is known of it."""
 
 
 @dataclass(frozen=True)
@@ -292,6 +295,8 @@ class Simulation:
         events = self._watch.events() if self._watch else None
         if events is not None:
             record.events = events
+        if self._watch and (geometry := self._watch.geometry()):
+            record.geometry = geometry
         if ended is not None:
             record.ended = EndRecord(instance=ended.instance, time=ended.time, message=str(ended))
         self._note_warnings()

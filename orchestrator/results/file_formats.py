@@ -73,7 +73,7 @@ FORMATS = {
         "parquet_and_mdf:ParquetRecorder", "parquet_and_mdf:ParquetFile", bytes=7,
     ),
     "mf4": Format(
-        "results.mf4", "ASAM MDF", "parquet_and_mdf:MdfRecorder", "parquet_and_mdf:MdfFile", bytes=5,
+        "results.mf4", "ASAM MDF", "parquet_and_mdf:MdfRecorder", "parquet_and_mdf:MdfFile", bytes=8,
         package="asammdf", extra="mdf",
     ),
 }  # fmt: skip

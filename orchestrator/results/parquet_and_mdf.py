@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import contextlib
 import io
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -99,31 +100,50 @@ class ParquetFile:
             yield [plain(values_of(batch.column(name))) for name in columns]
 
 
+@dataclass(frozen=True)
+class MdfGroup:
+    """A group of channels with common times [s]."""
+
+    name: str
+    comment: str
+    time: np.ndarray
+    columns: Mapping[str, np.ndarray]
+    units: Mapping[str, str | None]
+
+
+def mdf_of(groups: Sequence[MdfGroup], started: str | None) -> bytes:
+    """Return the bytes of a file of MDF 4; `started`: in ISO 8601.
+
+    Data are not compressed: programs that read one channel after the other, as most do, would decompress the
+    whole group for each, 3.4 s for the 95 channels of a run of 6.5 s where it takes 0.2 s now.
+    """
+    package: Any = FORMATS["mf4"].require()
+    with package.MDF(version="4.10") as mdf:
+        if started:
+            mdf.header.start_time = datetime.fromisoformat(started)
+        for group in groups:
+            signals = [
+                package.Signal(
+                    _samples(array), group.time, name=name, unit=group.units.get(name) or "", encoding="utf-8"
+                )
+                for name, array in group.columns.items()
+            ]
+            mdf.append(signals, acq_name=group.name or None, comment=group.comment, common_timebase=True)
+        data = io.BytesIO()
+        mdf.save(data, compression=0)
+    return data.getvalue()
+
+
 class MdfRecorder(ColumnRecorder):
     """Records a run as MDF 4. All rows stay in memory until the run has ended."""
 
     file = FILES["mf4"]
 
     def _complete(self, record: RunRecord) -> None:
-        package: Any = FORMATS["mf4"].require()
         time, *columns = self._columns.arrays()
-        signals = [
-            package.Signal(
-                _samples(array), time, name=name, unit=self.units.get(name) or "", encoding="utf-8"
-            )
-            for name, array in zip(self.columns, columns, strict=True)
-        ]
-        with package.MDF(version="4.10") as mdf:
-            if record.started:
-                mdf.header.start_time = datetime.fromisoformat(record.started)
-            mdf.append(
-                signals,
-                comment=with_changes(record.title or "", record.overrides),
-                common_timebase=True,
-            )
-            data = io.BytesIO()
-            mdf.save(data, compression=2)  # transposed before it is deflated: columns change slowly
-        self._append(data.getvalue())
+        title = with_changes(record.title or "", record.overrides)
+        group = MdfGroup("", title, time, dict(zip(self.columns, columns, strict=True)), self.units)
+        self._append(mdf_of([group], record.started))
 
 
 def _samples(array: np.ndarray) -> np.ndarray:

@@ -262,6 +262,7 @@ class RunRecord(_Part):
     connections: list[ConnectionRecord] = []
     faults: list[FaultRecord] = []
     events: list[EventRecord] = []  # in the order of their begin
+    geometry: dict[str, Any] = {}  # of where the run took place, e.g. lanes
     diagnostics: list[RecordedDiagnostic] = []
     scenario: RecordedScenario = {}
     versions: dict[str, str] = {}

@@ -14,8 +14,8 @@ from tests.fmus.fake_fmus import Var, make_fmu, out
 from tests.refusals import mentions
 from yawbench.foundation.errors import warnings_in
 from yawbench.vehicles.derivations import known_car
+from yawbench.vehicles.quantities import CAR
 from yawbench.vehicles.suspicious_values import suspicious_vehicle
-from yawbench.vocabulary.vehicle import CAR
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 SCENARIO = """\

@@ -37,7 +37,7 @@ from yawbench.proving_ground.handling import (
 )
 from yawbench.tyre_stand import cornering_stiffness
 from yawbench.vehicles.derivations import car_of
-from yawbench.vocabulary.vehicle import CAR
+from yawbench.vehicles.quantities import CAR
 
 FOLDER = Path(__file__).parents[2] / "scenarios" / "vehicles"
 STEADY_TURN = FOLDER.parent / "one_car" / "steady_turn.yaml"

@@ -1,4 +1,4 @@
-"""`yawbench animate`: an interactive page of recorded runs."""
+"""`yawbench animate`: an interactive page of recorded runs, or a video of it."""
 
 from __future__ import annotations
 
@@ -22,9 +22,18 @@ from yawbench.commands.recorded_runs import (
     start_of,
     with_segments,
 )
-from yawbench.foundation.errors import ResultsError
+from yawbench.foundation.errors import ResultsError, ScenarioError
+from yawbench.foundation.messages import hint, listed
 
-Page = Annotated[Path | None, typer.Option("--out", metavar="FILE.html", help="Page to write.")]
+Page = Annotated[
+    Path | None, typer.Option("--out", metavar="FILE", help="Page (.html), or video: .gif, .webp, .png.")
+]
+Camera = Annotated[
+    str | None, typer.Option(help="Of a video: chase, side, fixed, orbit, cars or whole. Default: chase.")
+]
+Speed = Annotated[
+    float | None, typer.Option(min=0.01, max=100.0, help="Of a video over that of the cars. Default: 1.")
+]
 
 
 @takes(*CHANGES, "fmus", "no_build")
@@ -35,17 +44,42 @@ def animate(
     measured: MeasuredRuns = None,
     begin: MeasuredFrom = "0 s",
     out: Page = None,
+    camera: Camera = None,
+    speed: Speed = None,
 ) -> None:
-    """Write an interactive page of runs, like `plot --page`.
+    """Write an interactive page of runs, like `plot --page`, or a video of them.
 
     Shows all recorded signals with a common cursor, zoom and differences from a baseline, and animates
-    cars, paths, lanes, road patches, tyre forces and friction circles. A scenario is run first if its
-    results are missing or out of date. Without --out, the page of one run is view.html in its folder,
-    that of several goes to their common parent folder.
+    cars, paths, lanes, road patches, tyre forces and friction circles, from above and in three dimensions.
+    A scenario is run first if its results are missing or out of date. Without --out, the page of one run
+    is view.html in its folder, that of several goes to their common parent folder. A video shows what a
+    camera of the page does; it needs Chromium. The first run is solid, the others are ghosts.
     """
+    from yawbench.reports.video import CAMERAS, FORMATS
+
+    moving = out is not None and out.suffix in FORMATS
+    if (camera is not None or speed is not None) and not moving:
+        raise ScenarioError(
+            f"--camera and --speed are of a video: name one with --out, ending with "
+            f"{listed(FORMATS, last='or')}",
+            code="option-invalid",
+        )
+    if camera is not None and camera not in CAMERAS:
+        raise ScenarioError(
+            f"--camera {camera}: no such camera{hint(camera, CAMERAS, lead='there are')}",
+            code="option-invalid",
+        )
     start = start_of(begin)
     folders = with_segments(recorded(sources, options), measured)
-    write_view(folders, labels_of(folders, label), (), out, start)
+    labels = labels_of(folders, label)
+    if not moving or out is None:
+        write_view(folders, labels, (), out, start)
+        return
+    from yawbench.reports.video import write_video
+
+    text = page_of(folders, labels, (), start)
+    count = write_video(text, out, camera=camera or "chase", speed=speed or 1.0)
+    say(f"{out}: {count} frames, {out.stat().st_size / 1000:.0f} kB")
 
 
 def write_view(
@@ -67,14 +101,9 @@ def write_view(
     Raises:
         ResultsError: a run cannot be read, or the page cannot be written.
     """
-    from yawbench.figures.display import LabelledRun
     from yawbench.foundation.safe_files import write_whole
-    from yawbench.reports.viewer import SETTINGS, Settings, page
-    from yawbench.reports.viewer_views import View
 
-    read = read_runs(folders, start)
-    runs = [LabelledRun(name, results) for name, results in zip(labels, read, strict=True)]
-    text = page(runs, Settings((View(panels=panels),)) if panels else SETTINGS)
+    text = page_of(folders, labels, panels, start)
     file = out or folder_of_all(folders) / "view.html"
     try:
         write_whole(file, text, named=out is not None)
@@ -83,3 +112,14 @@ def write_view(
             f"{file}: cannot write the page: {error.strerror or error}", code="results-unwritable"
         ) from None
     say(f"{file}: {len(text.encode()) / 1000:.0f} kB")
+
+
+def page_of(folders: Sequence[Path], labels: Sequence[str], panels: Sequence[str], start: float) -> str:
+    """Return the page of a viewer; for arguments and errors see `write_view`."""
+    from yawbench.figures.display import LabelledRun
+    from yawbench.reports.viewer import SETTINGS, Settings, page
+    from yawbench.reports.viewer_views import View
+
+    read = read_runs(folders, start)
+    runs = [LabelledRun(name, results) for name, results in zip(labels, read, strict=True)]
+    return page(runs, Settings((View(panels=panels),)) if panels else SETTINGS)

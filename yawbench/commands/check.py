@@ -237,8 +237,10 @@ def _beside_tyres(plan: Plan) -> Iterable[Sequence[str]]:
 
 
 def _idle(plan: Plan) -> list[str]:
-    """Return the values of the vehicle file that no instance uses."""
-    names = plan.scenario.get("vehicle_parameters", {})
+    """Return the values of the vehicle file that neither an instance nor the scene uses."""
+    from yawbench.vehicles.quantities import BODY
+
+    names = [name for name in plan.scenario.get("vehicle_parameters", {}) if name not in BODY]
     return [
         name for name in names if not any(instance.fmu.variables.get(name) for instance in plan.instances)
     ]

@@ -19,6 +19,7 @@ from yawbench.orchestrator.plan import Plan
 from yawbench.orchestrator.results.reader import Results
 from yawbench.orchestrator.results.record_of_plan import faults_of
 from yawbench.orchestrator.results.run_record import EventRecord
+from yawbench.scene.outline import fed, places_of
 from yawbench.vocabulary.gravity import G
 from yawbench.vocabulary.motion import LEAST_SPEED
 from yawbench.vocabulary.wheels import WHEEL_NAMES, wheels
@@ -66,14 +67,6 @@ def number(results: Results, instance: str, *names: str) -> float | None:
     values = parameters(results, instance)
     found = (values.get(name) for name in names)
     return next((float(v) for v in found if isinstance(v, (int, float)) and not isinstance(v, bool)), None)
-
-
-def fed(results: Results, instance: str, variable: str) -> str | None:
-    """Return the recorded column that feeds an input; None if it is not recorded, or nothing does."""
-    for wire in results.record.connections:
-        if (wire.target.instance, wire.target.variable) == (instance, variable):
-            return str(wire.source) if str(wire.source) in results.columns else None
-    return None
 
 
 def friction_at(results: Results) -> tuple[list[str], list[float]] | None:
@@ -496,6 +489,10 @@ class WarningWatch(EventWatch):
     def events(self) -> None:
         """Return nothing: most events were not looked for."""
 
+    def geometry(self) -> dict[str, Any]:
+        """Return nothing: results in memory have no record to read."""
+        return {}
+
 
 class RunWatch(EventWatch):
     """Looks for all events of a run of a plan, and has its faults."""
@@ -503,6 +500,26 @@ class RunWatch(EventWatch):
     def __init__(self, plan: Plan) -> None:
         self._results = _to_be(plan, defaults=True)
         super().__init__(self._results, (*WARNED, *_ranges(plan), *EVENTS))
+        self._path = [self._index(name) for name in ("position_x", "position_y")]
+        self._bounds = [(math.inf, -math.inf)] * len(self._path)
+
+    def _index(self, signal: str) -> int | None:
+        """Return the place of a signal in the rows, None if it is not recorded."""
+        columns = columns_of(self._results, signal)
+        return 1 + self.reals.index(columns[0]) if columns and columns[0] in self.reals else None
+
+    def look(self, rows: np.ndarray) -> None:
+        super().look(rows)
+        for k, index in enumerate(self._path):
+            if index is not None and rows.size:
+                low, high = self._bounds[k]
+                ends = np.fmin.reduce(rows[:, index]), np.fmax.reduce(rows[:, index])
+                self._bounds[k] = float(np.fmin(low, ends[0])), float(np.fmax(high, ends[1]))
+
+    def geometry(self) -> dict[str, Any]:
+        if not np.isfinite(self._bounds).all():
+            return {}
+        return places_of(self._results, *self._bounds).record()
 
     def events(self) -> list[EventRecord]:
         return _with_faults(self.found(), self._results)

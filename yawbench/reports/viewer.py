@@ -49,7 +49,8 @@ from .viewer_views import Bound, Mark, View
 
 SCRIPTS = (
     "viewer_data.js", "viewer_panels.js", "viewer_draw.js", "viewer_picture.js", "viewer_events.js",
-    "viewer_scene.js", "viewer_close_up.js", "viewer_road.js", "viewer.js", "viewer_side.js",
+    "viewer_scene.js", "viewer_close_up.js", "viewer_space.js", "viewer_road.js", "viewer.js",
+    "viewer_side.js",
 )  # fmt: skip
 SHEETS = ("uPlot.min.css", "viewer.css")
 MOST = 200

@@ -25,7 +25,6 @@ from yawbench.orchestrator.wiring.parameters import Parameters, is_parameter, of
 from yawbench.vocabulary.friction_table import table_of
 from yawbench.vocabulary.patches import patches_of
 from yawbench.vocabulary.signals import SYMBOLS
-from yawbench.vocabulary.vehicle import CAR
 from yawbench.vocabulary.wheels import WHEELS
 
 from .derivations import (
@@ -38,6 +37,7 @@ from .derivations import (
     contradictions,
     quantity_of,
 )
+from .quantities import BODY, CAR
 from .suspicious_values import suspicious_values
 
 if TYPE_CHECKING:
@@ -138,7 +138,7 @@ class CarParameters(Parameters):
             for instance in self.takers(name):
                 self.give(instance, name, given, f"{instance}.{name} = {formula}: ")
         for name in idle:
-            if name not in self._car.used and self._of_car[name].changed:
+            if name not in self._car.used and name not in BODY and self._of_car[name].changed:
                 sentence = f"vehicle.{name} changes nothing: no instance takes it or what follows"
                 self.system.note("value-unused", sentence)
 

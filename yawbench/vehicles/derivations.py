@@ -20,7 +20,8 @@ from typing import NamedTuple
 from yawbench.fmus.fmu import Value, Variable
 from yawbench.orchestrator.wiring.parameters import value_for
 from yawbench.vocabulary.gravity import G
-from yawbench.vocabulary.vehicle import CAR
+
+from .quantities import CAR
 
 STIFFNESSES = ("cornering_stiffness_front", "cornering_stiffness_rear")
 STATIC_LOADS = ("static_load_front", "static_load_rear")

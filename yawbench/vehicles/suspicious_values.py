@@ -22,9 +22,9 @@ from yawbench.orchestrator.scenario.loader import LoadedScenario
 from yawbench.orchestrator.scenario.quantities import exact_text, meant_unit, number_and_unit
 from yawbench.vocabulary.facts import FACTS
 from yawbench.vocabulary.roles import without_role
-from yawbench.vocabulary.vehicle import CAR
 
 from .derivations import STIFFNESSES, known_car
+from .quantities import CAR
 from .tir import TyreFile
 
 PLAUSIBLE = {

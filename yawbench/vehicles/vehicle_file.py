@@ -8,7 +8,8 @@ from pydantic import Field, WithJsonSchema
 
 from yawbench.orchestrator.scenario.schema import GivenScalar, Vehicle
 from yawbench.orchestrator.scenario.schema_validation import in_unit
-from yawbench.vocabulary.vehicle import CAR
+
+from .quantities import CAR
 
 
 def _of_car() -> dict[str, Any]:

@@ -217,7 +217,7 @@ class Viewer extends InAddress {
   initial() {
     return {
       view: 0, ...this.viewed(0), span: null, heights: {}, tall: [], time: this.data.still, pin: null, lit: null,
-      difference: false, tolerance: 0, camera: 'cars', near: 1, offsets: {},
+      difference: false, tolerance: 0, camera: 'cars', look: [0, 0], near: 1, offsets: {},
     };
   }
 
@@ -245,7 +245,8 @@ class Viewer extends InAddress {
       pin: (v) => v === null || Number.isFinite(v),
       lit: (v) => v === null || (Array.isArray(v) && v.length === 3 && typeof v[0] === 'string' && this.known(v[0]) && (v[1] === null || Number.isFinite(v[1])) && typeof v[2] === 'string'),
       time: Number.isFinite, difference: (v) => typeof v === 'boolean', tolerance: (v) => Number.isFinite(v) && v >= 0,
-      x: (v) => this.axes().includes(v), camera: (v) => v === 'cars' || v === 'whole' || isRun(v),
+      x: (v) => this.axes().includes(v), camera: (v) => ['cars', 'whole', ...CAMERAS].includes(v) || isRun(v),
+      look: (v) => Array.isArray(v) && v.length === 2 && v.every(Number.isFinite),
       near: (v) => v >= ZOOM[0] && v <= ZOOM[1],
       offsets: (v) => isRecord(v) && Object.values(v).every(Number.isFinite),
     };

@@ -1,15 +1,21 @@
 // The road from above and a close-up of each car, at the cursor's time; plays.
 
+const IN_SPACE = ['roll_angle', 'pitch_angle', 'heave', 'wind_force_y'];
+
 // What scene and close-ups need of a run: channels in SI units at every recorded row.
 function channelsOf(run) {
   const {road} = run;
   const column = (name) => (road[name] ? run.column(road[name]) : null);
   const channels = {time: run.shifted, x: column('x'), y: column('y'), yaw: unwrapped(column('yaw'))};
-  for (const name of ['yaw_rate', 'steer_angle', 'yaw_moment', 'cone_overrun']) if (road[name]) channels[name] = column(name);
+  for (const name of ['yaw_rate', 'steer_angle', 'yaw_moment', 'cone_overrun', ...IN_SPACE]) if (road[name]) channels[name] = column(name);
   if (road.sideslip) channels.sideslip = column('sideslip'); // NaN while the car stands
   if (road.path_offset) {
     const off = column('path_offset');
     channels.path_y = channels.y.map((y, i) => y - off[i]);
+  }
+  for (const wheel of WHEELS.filter((one) => road['spin_' + one])) {
+    let turned = 0;
+    channels['turned_' + wheel] = column('spin_' + wheel).map((speed, i) => (turned += i ? speed * (run.time[i] - run.time[i - 1]) : 0));
   }
   for (const wheel of WHEELS) {
     if (!road['force_along_' + wheel]) break;
@@ -20,7 +26,8 @@ function channelsOf(run) {
     if (!('friction_' + wheel in road)) continue;
     const mu = road['friction_' + wheel];
     const friction = typeof mu === 'number' ? () => mu : ((values) => (i) => values[i])(run.column(mu));
-    channels['grip_' + wheel] = column('load_' + wheel).map((load, i) => friction(i) * Math.max(load, 0));
+    channels['load_' + wheel] = column('load_' + wheel);
+    channels['grip_' + wheel] = channels['load_' + wheel].map((load, i) => friction(i) * Math.max(load, 0));
   }
   return untilLost(channels);
 }
@@ -120,6 +127,14 @@ class Road {
       this.draw();
       viewer.remember();
     });
+    turnByDragging(this.scene, () => this.inSpace, (turn, rise) => {
+      const {look} = viewer.state;
+      viewer.state.look = [(look[0] + turn) % (2 * Math.PI), Math.min(Math.max(look[1] + rise, -1.5), 1.5)];
+      this.draw();
+      viewer.remember();
+    });
+    find('large').addEventListener('click', () => (document.fullscreenElement ? document.exitFullscreen() : find('road').requestFullscreen()));
+    find('road').addEventListener('fullscreenchange', () => this.draw());
     find('nearer').addEventListener('click', () => this.zoom(1.25));
     find('farther').addEventListener('click', () => this.zoom(0.8));
   }
@@ -149,7 +164,7 @@ class Road {
       return figure;
     }));
     const chosen = String(viewer.state.camera);
-    const views = [['cars', this.shown.length > 1 ? 'all cars' : 'car'], ...(this.shown.length > 1 ? this.shown.map((run) => [String(run.number), run.label]) : []), ['whole', 'whole path']];
+    const views = [['cars', this.shown.length > 1 ? 'all cars' : 'car'], ...(this.shown.length > 1 ? this.shown.map((run) => [String(run.number), run.label]) : []), ['whole', 'whole path'], ...CAMERAS.map((one) => [one, `3-D: ${one}`])];
     this.camera.replaceChildren(...views.map(([value, words]) => new Option(words, value)));
     this.camera.value = views.some(([value]) => value === chosen) ? chosen : 'cars';
   }
@@ -164,8 +179,15 @@ class Road {
     this.view.camera = index >= 0 ? index : (chosen === 'whole' ? 'whole' : 'cars');
     this.view.zoom = viewer.state.near;
     this.states = states;
+    this.inSpace = CAMERAS.includes(chosen) && this.shown.length > 0;
+    this.scene.classList.toggle('yv-space', this.inSpace);
+    this.scene.ariaLabel = this.inSpace ? `The cars in three dimensions, ${chosen} camera` : 'The road from above';
     if (!this.shown.length) { surface(this.scene, density); return; }
-    drawScene(this.scene, density, this.shown, states, this.view, this.scale);
+    if (this.inSpace) {
+      const {look, near} = viewer.state;
+      const lead = Math.max(this.shown.indexOf(viewer.lead()), 0);
+      drawSpace(this.scene, density, this.shown, states, {camera: chosen, lead, look, near, scale: this.scale, strongest: this.strongest, time});
+    } else drawScene(this.scene, density, this.shown, states, this.view, this.scale);
     [...this.closeUps.querySelectorAll('canvas')].forEach((canvas, i) => {
       drawCloseUp(canvas, density, this.shown[i], i, states[i], this.scale, this.strongest);
     });

@@ -9,8 +9,8 @@ from tests.orchestrator.recorded import noted
 from tests.refusals import mentions
 from tests.reports.made_up import data_in, unpacked, whole_car
 from yawbench.figures.display import LabelledRun
-from yawbench.reports.road import POLYGONS, clipped, ground_of
 from yawbench.reports.viewer import viewer
+from yawbench.scene.ground import POLYGONS, clipped, ground_of
 from yawbench.vocabulary.friction_table import table_of
 from yawbench.vocabulary.patches import friction_at, inside_polygon, patches_of
 

@@ -1,0 +1,150 @@
+"""The scene of a page in three dimensions, and videos of it."""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import json
+from urllib.parse import quote
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import yawbench as yb
+from tests.command_line import status_of
+from tests.refusals import mentions, refused
+from yawbench.foundation.errors import ResultsError, ScenarioError
+from yawbench.reports import video
+from yawbench.reports.page_parts import static, without_comments
+from yawbench.reports.road import road_of
+
+LARGEST, FRAME = 60_000, 16.0
+"""Bytes that a page may grow by, and time of a frame [ms]."""
+PICTURE = "return document.querySelector('.yv-scene').toDataURL()"
+TIMES = """
+const {state, road, ends} = document.querySelector('.yv').viewer;
+const [begin, end] = document.querySelector('.yv').viewer.ends();
+const context = road.scene.getContext('2d'), times = [];
+for (let k = 0; k < 100; k++) {
+  state.time = begin + (k * (end - begin)) / 100;
+  const from = performance.now();
+  road.draw();
+  context.getImageData(0, 0, 1, 1); // waits until it is drawn
+  times.push(performance.now() - from);
+}
+return times.sort((a, b) => a - b);
+"""
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory):
+    """Folders of two runs of a lane change of ISO 3888."""
+    folder = tmp_path_factory.mktemp("runs")
+    made = []
+    for name, change in (("slow", "14 m/s"), ("fast", "20 m/s")):
+        arguments = ("scenarios/proving_ground/iso_3888_2.yaml", "--set", f"speed={change}")
+        assert status_of("run", *arguments, "--out", folder / name) == 0
+        made.append(folder / name)
+    return made
+
+
+@pytest.fixture(scope="module")
+def page(runs, tmp_path_factory):
+    file = tmp_path_factory.mktemp("page") / "view.html"
+    assert status_of("animate", *runs, "--out", file) == 0
+    return file
+
+
+def opened(chromium, page, **state):
+    chromium.open(page, "run?" + "&".join(f"{k}={quote(json.dumps(v))}" for k, v in state.items()))
+    chromium.wait_for("document.querySelector('.yv-ready')")
+
+
+def test_every_camera_shows_another_picture_that_a_link_repeats(chromium, page):
+    pictures = {}
+    for camera in ("cars", "chase", "side", "fixed", "orbit"):
+        opened(chromium, page, camera=camera, time=2.5)
+        pictures[camera] = chromium.run(PICTURE)
+        assert chromium.run("return document.querySelector('.yv-camera').value") == camera
+    assert len({*pictures.values()}) == len(pictures)
+    opened(chromium, page, camera="side", time=2.5)
+    assert chromium.run(PICTURE) == pictures["side"]
+    assert chromium.console() == []
+
+
+def test_the_scene_follows_the_cursor_and_turns_when_dragged(chromium, page):
+    from selenium.webdriver.common.action_chains import ActionChains
+
+    opened(chromium, page, camera="orbit", time=1.0)
+    before = chromium.run(PICTURE)
+    chromium.run("document.querySelector('.yv').viewer.seek(2.5)")
+    chromium.wait_for("document.querySelector('.yv-clock').textContent === '2.500 s'")
+    after = chromium.run(PICTURE)
+    assert after != before
+    scene = chromium.driver.find_element("css selector", ".yv-scene")
+    ActionChains(chromium.driver).drag_and_drop_by_offset(scene, 60, 20).perform()
+    assert chromium.run(PICTURE) != after
+    turn, rise = chromium.run("return document.querySelector('.yv').viewer.state.look")
+    assert turn < -0.1 and rise > 0.01
+    chromium.wait_for("location.hash.includes('look')")
+
+
+def test_a_hidden_run_is_not_drawn_and_the_baseline_is_solid(chromium, page):
+    opened(chromium, page, camera="orbit", time=2.5)
+    both = chromium.run(PICTURE)
+    opened(chromium, page, camera="orbit", time=2.5, baseline=1)
+    other = chromium.run(PICTURE)
+    opened(chromium, page, camera="orbit", time=2.5, shown=[0])
+    assert len({both, other, chromium.run(PICTURE)}) == 3
+
+
+def test_a_frame_takes_less_than_a_sixtieth_of_a_second_without_a_graphics_card(chromium, page):
+    for camera in ("chase", "side", "fixed", "orbit"):
+        opened(chromium, page, camera=camera)
+        times = chromium.run(TIMES)
+        print(f"{camera}: {times[len(times) // 2]:.1f} ms")
+        assert times[len(times) // 4] < FRAME  # the quieter frames of a computer that is busy with tests
+
+
+def test_the_scene_adds_less_to_a_page_than_allowed():
+    script = gzip.compress(without_comments(static("viewer_space.js")).encode())
+    assert len(base64.b64encode(script)) < LARGEST
+
+
+def test_pages_have_the_heights_of_wheels_in_the_air():
+    run = yb.load("proving_ground/sine_with_dwell").set({"stop_time": 3.0, "plant.cg_height": 0.9}).run()
+    height = run.scene().height - run.scene().car.radius
+    lifts = road_of(run.results, [])["lifts"]
+    assert lifts and max(max(heights) for *_, heights in lifts) == pytest.approx(height.max(), abs=0.002)
+    for wheel, begin, step, heights in lifts:
+        column = ("fl", "fr", "rl", "rr").index(wheel)
+        times = begin + step * np.arange(len(heights))
+        assert np.interp(times, run.time, height[:, column])[:-1] == pytest.approx(heights[:-1], abs=0.002)
+
+
+def test_a_video_has_the_frames_of_the_run_and_moves(runs, tmp_path, chromium):
+    file = tmp_path / "fast.gif"
+    assert status_of("animate", runs[1], "--camera", "side", "--speed", "4", "--out", file) == 0
+    with Image.open(file) as clip:
+        seconds = yb.open(runs[1]).time[-1]
+        assert clip.n_frames == int(seconds / 4 * video.RATE) + 1 and clip.size == video.SIZE
+        assert clip.info["duration"] == 1000 // video.RATE
+        frames = []
+        for k in (0, clip.n_frames // 2):
+            clip.seek(k)
+            frames.append(np.asarray(clip.convert("RGB"), float))
+    assert np.abs(frames[0] - frames[1]).mean() > 1.0
+
+
+def test_what_a_video_cannot_be_is_said_in_a_sentence(runs, page, chromium, capsys, monkeypatch, tmp_path):
+    assert status_of("animate", runs[0], "--camera", "chase") == 2
+    assert status_of("animate", runs[0], "--camera", "above", "--out", tmp_path / "a.gif") == 2
+    said = capsys.readouterr().err
+    assert mentions(said, "--camera", ".gif") and mentions(said, "above", "chase")
+    monkeypatch.setattr(video.shutil, "which", lambda name: None)
+    with refused(ResultsError, "package-missing", names=("chromium",)):
+        video.write_video("", tmp_path / "a.gif", camera="chase", speed=1.0)
+    monkeypatch.undo()
+    with refused(ScenarioError, "option-invalid", names=("--speed 0.01",)):
+        video.write_video(page.read_text(), tmp_path / "a.gif", camera="chase", speed=0.01)

@@ -1,0 +1,130 @@
+"""Runs as tables: CSV, Apache Parquet, ASAM MDF 4 and MATLAB files.
+
+CSV and Parquet have a row per run and instant; `run` is the label. CSV names units in its header,
+`plant.yaw_rate [rad/s]`, Parquet in the metadata of fields. MDF has a group of channels per run. A MATLAB
+file has a structure per run: `r.plant.yaw_rate`, with units in `r.units.plant.yaw_rate`. What a run has not
+recorded is missing there.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from yawbench.foundation.errors import ResultsError
+from yawbench.foundation.safe_files import write_whole
+from yawbench.orchestrator.results.file_formats import column_of
+from yawbench.orchestrator.results.parquet_and_mdf import MdfGroup, mdf_of
+
+from .formats import ExportedRun
+
+LONGEST = 63
+"""Characters of a name in MATLAB."""
+
+
+def write_csv(runs: Sequence[ExportedRun], file: Path) -> list[Path]:
+    """Write a row per run and instant, with units in the header."""
+    from pyarrow import BufferOutputStream, csv
+
+    table = _table(runs)
+    named = [f"{one.name} [{unit}]" if (unit := _unit(one)) else one.name for one in table.schema]
+    sink = BufferOutputStream()
+    csv.write_csv(table.rename_columns(named), sink)
+    write_whole(file, sink.getvalue().to_pybytes(), named=True)
+    return []
+
+
+def write_parquet(runs: Sequence[ExportedRun], file: Path) -> list[Path]:
+    """Write a row per run and instant, with units in the metadata of fields."""
+    import pyarrow.parquet as pq
+    from pyarrow import BufferOutputStream
+
+    sink = BufferOutputStream()
+    pq.write_table(_table(runs), sink, compression="zstd")
+    write_whole(file, sink.getvalue().to_pybytes(), named=True)
+    return []
+
+
+def _table(runs: Sequence[ExportedRun]) -> Any:
+    import pyarrow as pa
+
+    units: dict[str, str] = {}
+    for run in runs:
+        for name in run.signals:
+            units.setdefault(name, run.unit_of(name))
+    parts = []
+    for run in runs:
+        rows, signals = run.results.time.size, run.signals
+        columns = {"run": pa.array([run.label] * rows), "time": column_of(run.results.time)}
+        columns |= {
+            name: column_of(signals[name]) if name in signals else pa.nulls(rows, pa.float64())
+            for name in units
+        }
+        parts.append(pa.table(columns))
+    table = pa.concat_tables(parts)
+    texts = {"run": "", "time": "s", **units}
+    fields = [
+        field.with_metadata({"unit": texts[field.name]}) if texts[field.name] else field
+        for field in table.schema
+    ]
+    return table.cast(pa.schema(fields))
+
+
+def _unit(field: Any) -> str:
+    unit: bytes = (field.metadata or {}).get(b"unit", b"")
+    return unit.decode()
+
+
+def write_mdf(runs: Sequence[ExportedRun], file: Path) -> list[Path]:
+    """Write a group of channels per run, named by its label."""
+    groups = [
+        MdfGroup(run.label, run.title, run.results.time, run.results.columns, run.results.units)
+        for run in runs
+    ]
+    write_whole(file, mdf_of(groups, runs[0].results.record.started), named=True)
+    return []
+
+
+def write_mat(runs: Sequence[ExportedRun], file: Path) -> list[Path]:
+    """Write a structure per run: time, and a structure per instance; the same with units.
+
+    Raises:
+        ResultsError: the file would be too large for MATLAB 5.
+    """
+    import io
+
+    from scipy.io import savemat
+    from scipy.io.matlab import MatWriteError
+
+    content: dict[str, Any] = {}
+    for run in runs:
+        one: dict[str, Any] = {"title": run.title, "label": run.label, "time": run.results.time[:, None]}
+        units: dict[str, Any] = {"time": "s"}
+        for column, values in run.signals.items():
+            instance, _, variable = column.partition(".")
+            inner = _identifier(variable, one.get(_identifier(instance), {}))
+            one.setdefault(_identifier(instance), {})[inner] = values[:, None]
+            units.setdefault(_identifier(instance), {})[inner] = run.unit_of(column) or "1"
+        content[_identifier(run.label, content)] = {**one, "units": units}
+    data = io.BytesIO()
+    try:
+        savemat(data, content, long_field_names=True, do_compression=True)
+    except (MatWriteError, OverflowError):
+        raise ResultsError(
+            f"{file}: a MATLAB file holds 2 GB a variable at most; record less, or take --to parquet",
+            code="results-unwritable",
+        ) from None
+    write_whole(file, data.getvalue(), named=True)
+    return []
+
+
+def _identifier(name: str, taken: Any = ()) -> str:
+    """Return a name as MATLAB allows it, unlike those taken: letters, digits and _, a letter first."""
+    text = re.sub(r"[^A-Za-z0-9_]", "_", name)
+    text = (text if text[:1].isalpha() else f"r_{text}")[: LONGEST - 4]
+    number = 2
+    while (numbered := text if number == 2 else f"{text}_{number}") in taken or numbered == "units":
+        number += 1
+    return numbered
