@@ -57,6 +57,7 @@ if TYPE_CHECKING:
     from yawbench.ranking.library import Ranking, rank
 
     from ._controller import Controller
+    from ._distributions import Drawn, normal, tabulated, uniform
     from ._experiment import Experiment, Runs, experiment
     from ._export import export_fmu
     from ._open import RecordedRuns, open
@@ -69,6 +70,7 @@ __all__ = [
     "BuildError",
     "Controller",
     "Diagnostic",
+    "Drawn",
     "Evaluation",
     "Experiment",
     "Fit",
@@ -100,12 +102,15 @@ __all__ = [
     "linearize",
     "load",
     "measured",
+    "normal",
     "open",
     "output",
     "parameter",
     "rank",
     "signal",
+    "tabulated",
     "tune",
+    "uniform",
     "validate",
     "view",
 ]
@@ -129,6 +134,7 @@ _MODULES = {
     "yawbench.metrics.verdict": ("Verdict",),
     "yawbench.orchestrator.plan": ("Override", "Plan"),
     "yawbench._controller": ("Controller",),
+    "yawbench._distributions": ("Drawn", "normal", "tabulated", "uniform"),
     "yawbench._experiment": ("Experiment", "Runs", "experiment"),
     "yawbench._export": ("export_fmu",),
     "yawbench._open": ("RecordedRuns", "open"),

@@ -52,6 +52,7 @@ from yawbench.studies.result_tables import (
 from yawbench.studies.schema import FigureSpec
 from yawbench.studies.sections import sections
 from yawbench.studies.tables import Cell, Table
+from yawbench.studies.uncertainty import sample_tables
 
 from .comparison import ComparisonView
 from .diagram import diagram, systems_of
@@ -213,7 +214,7 @@ def chapter(
         sweep=sweep,
         figures=figure_files(findings),
         charts=charts(findings, folder / FIGURES),
-        tables=[*run_tables(findings), *derived_tables(findings, apart=True)],
+        tables=[*run_tables(findings), *derived_tables(findings, apart=True), *sample_tables(findings)],
         definitions=definitions(findings),
         groups=groups,
         kinds=count_kinds(groups),
