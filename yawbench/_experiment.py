@@ -110,7 +110,9 @@ def experiment(
         with arguments.as_scenario_errors():
             labelled = isinstance(levels, Mapping)
             if labelled and name not in (*base._loaded.units, SCENARIO):
-                raise TypeError(f"{name}: must be a list of values; only instances and scenarios have labelled levels")
+                raise TypeError(
+                    f"{name}: must be a list of values; only instances and scenarios have labelled levels"
+                )
             pairs = (
                 list(arguments.mapping(levels, name, "a mapping of labels to levels").items())
                 if labelled
@@ -136,7 +138,7 @@ def experiment(
             numbers = numbers_of(name, [level for _, level in pairs])
             specs[name] = made(DesignAxisSpec, f"axes.{name}", vary=name, **numbers)
     wanted = arguments.texts(metrics, "metrics")
-    design = experiment_of(
+    expanded = experiment_of(
         base.path,
         [NamedRun("", "", "", base.path, ())],
         changes=changed.changes,
@@ -145,7 +147,7 @@ def experiment(
         title=base.title or base.path.stem,
         metrics={name: made(MetricSpec, f"metrics.{name}", metric=name) for name in wanted},
     )
-    return Experiment(changed, design)
+    return Experiment(changed, expanded)
 
 
 def _scenario_file(level: object) -> Path:
@@ -284,7 +286,7 @@ class Runs:
 
     @property
     def statistics(self) -> pd.DataFrame:
-        """Mean, deviation and percentiles of each metric over what is drawn, each with its interval, in SI."""
+        """Mean, deviation and percentiles of each metric over what is drawn, with their intervals."""
         return self._of_sample("statistics")
 
     @property

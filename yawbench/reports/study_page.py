@@ -412,16 +412,17 @@ def figure_files(findings: ExperimentResult) -> list[tuple[str, str]]:
     return [
         (title_of(findings, spec), f"{FIGURES}/{spec.name}")
         for spec in findings.spec.figures
-        if spec.what.over_axes or (spec.what.shows == "runs" and runs_of(findings, spec))
+        if (spec.what.over_axes and not spec.what.of_sample)
+        or (spec.what.shows == "runs" and runs_of(findings, spec))
     ]
 
 
 def charts(findings: ExperimentResult, folder: Path) -> list[FigureImage]:
-    """Return the drawn figures of grids as images; the view of the sweep shows those over axes."""
+    """Return the drawn figures of grids and samples as images; the view of the sweep shows the others."""
     drawn = []
     for spec in findings.spec.figures:
         file = folder / f"{spec.name}.svg"
-        if spec.what.shows == "grid" and file.is_file():
+        if (spec.what.shows == "grid" or spec.what.of_sample) and file.is_file():
             drawn.append(image_of(file, title_of(findings, spec)))
     return drawn
 

@@ -124,7 +124,9 @@ class AxisSpec(StrictModel):
     values: Levels | None = Field(None, description="A list, or a mapping of values to words")
     start: Number | None = Field(None, alias="from", description="The first of `count` values")
     end: Number | None = Field(None, alias="to", description="The last")
-    count: int | None = Field(None, ge=2, le=MOST, description="Number of values; without it the range is drawn from")
+    count: int | None = Field(
+        None, ge=2, le=MOST, description="Number of values; without it the range is drawn from"
+    )
     spacing: Literal["linear", "log"] = Field("linear", description="Equal steps or equal factors")
     unit: str | None = Field(None, description="Unit of the numbers; default: that of the parameter")
     says: str = Field("", description="Label in figures; default: the parameter in words")

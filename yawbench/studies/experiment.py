@@ -154,9 +154,9 @@ class LoadedExperiment(LoadedFile):
         """Return the scenario of a run at a point."""
         scenario = run.scenario
         for axis, level in zip(self.spec.axes.values(), point, strict=True):
-            if axis.variants and (named := axis.variants[str(level.value)].scenario):
-                if any(fnmatchcase(run.name, pattern) for pattern in axis.runs):
-                    scenario = self.path.parent / named.replace("{scenario}", run.scenario.stem)
+            named = axis.variants[str(level.value)].scenario if axis.variants else ""
+            if named and any(fnmatchcase(run.name, pattern) for pattern in axis.runs):
+                scenario = self.path.parent / named.replace("{scenario}", run.scenario.stem)
         return scenario
 
     def setting(self, point: DesignPoint) -> DesignPoint:

@@ -142,7 +142,11 @@ def _in_names(spec: ExperimentSpec, runs: Collection[str]) -> Iterator[Problem]:
     for group, number, claim in spec.assertions():
         yield from _unknown(spec, runs, named_in(claim, (group, number)))
     for key, condition in spec.conditions():
-        if not (condition.derived or condition.run) and spec.runs and key[0] not in ("limits", "probabilities"):
+        if (
+            not (condition.derived or condition.run)
+            and spec.runs
+            and key[0] not in ("limits", "probabilities")
+        ):
             yield Problem(key, "needs run and metric, or derived in place of both", "figure-invalid")
     for name, grid in spec.grids.items():
         what = "derived number" if grid.derived else "run"
@@ -200,7 +204,9 @@ def _in_figure(spec: ExperimentSpec, figure: FigureSpec) -> Iterator[Problem]:
         if name in spec.repeats:
             yield Problem((key,), f"numbers are means over {name!r}", "figure-invalid")
         if figure.what.of_sample and name in spec.drawn:
-            yield Problem((key,), f"the values of {name!r} are drawn: nothing is said of each", "figure-invalid")
+            yield Problem(
+                (key,), f"the values of {name!r} are drawn: nothing is said of each", "figure-invalid"
+            )
         if key in "xy" and name in spec.axes and figure.what.upwards and not spec.axes[name].numeric:
             yield Problem((), f"the values of {name!r} must be numbers", "figure-invalid")
     if figure.what.of_sample and not spec.sampled:

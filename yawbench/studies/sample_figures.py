@@ -56,7 +56,7 @@ class DistributionDrawing(SampleDrawing):
     def __init__(self, findings: ExperimentResult, spec: FigureSpec) -> None:
         super().__init__(findings, spec)
         self.upwards = "Share of all points"
-        self.across = f"Difference of {self.measured}" if spec.against else self.measured
+        self.across = f"{self.measured}, less that of {spec.against}" if spec.against else self.measured
         self._drawn = 0
 
     def _baseline(self, of: Group) -> Group | None:

@@ -1,7 +1,7 @@
 """Samples: distributions of what varies, and where their points lie.
 
-A distribution turns a relative position, 0 to 1, into a value (its quantile function), so that every design of
-points in the unit cube is one of values: a Latin hypercube, a Sobol sequence, or random points.
+A distribution turns a relative position, 0 to 1, into a value (its quantile function), so that every design
+of points in the unit cube is one of values: a Latin hypercube, a Sobol sequence, or random points.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -78,8 +79,8 @@ class Normal:
         share = float(ndtr(-low) - ndtr(-high)) if low > 0 else float(ndtr(high) - ndtr(low))
         if not share >= LEAST:
             raise ValueError(
-                f"normal: of mean {self.mean:g} and deviation {self.deviation:g}, a share of {max(share, 0.0):.1g} "
-                f"lies between from and to; at least {LEAST:g} is needed"
+                f"normal: of mean {self.mean:g} and deviation {self.deviation:g}, a share of "
+                f"{max(share, 0.0):.1g} lies between from and to; at least {LEAST:g} is needed"
             )
 
     def at(self, position: float) -> float:
@@ -158,9 +159,7 @@ def table_of(rows: Sequence[Any]) -> tuple[tuple[float, float], ...]:
     values, shares = zip(*rows, strict=True)
     if len(rows) < 2 or shares[0] != 0 or shares[-1] != 1:
         raise ValueError("cumulative shares must begin with 0 and end with 1")
-    if any(a >= b for a, b in zip(values, values[1:], strict=False)) or any(
-        a > b for a, b in zip(shares, shares[1:], strict=False)
-    ):
+    if any(a >= b for a, b in pairwise(values)) or any(a > b for a, b in pairwise(shares)):
         raise ValueError("values must rise, and cumulative shares must not fall")
     return tuple((float(value), float(share)) for value, share in rows)
 
@@ -179,8 +178,8 @@ def positions(design: str, axes: int, points: int, seed: int) -> np.ndarray:
 
     `latin_hypercube` see `hypercube`; `sobol`: the first of a Sobol sequence scrambled by the seed
     (`scipy.stats.qmc.Sobol`; A. B. Owen, Journal of Complexity 14 (1998) 466-489); `random`: independent
-    ones. `saltelli`: points A and B of a Sobol sequence, then for every axis A with the values of B on it, from
-    which Sobol indices follow (A. Saltelli et al., Computer Physics Communications 181 (2010) 259-270).
+    ones. `saltelli`: points A and B of a Sobol sequence, then for every axis A with the values of B on it,
+    from which Sobol indices follow (A. Saltelli et al., Computer Physics Communications 181 (2010) 259-270).
     """
     if design == "latin_hypercube":
         return hypercube(axes, points, points, seed)

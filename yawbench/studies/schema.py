@@ -167,6 +167,7 @@ from yawbench.orchestrator.scenario.schema_validation import OneOf, StrictModel,
 from yawbench.orchestrator.scenario.yaml_lines import KeyPath
 
 from .axes import MOST, SCENARIO, AxisSpec, DesignAxisSpec, OverrideSpec, RegionSpec
+from .claim_schema import LEVELS as VALUES
 from .claim_schema import (
     Alternatives,
     Assertion,
@@ -183,7 +184,6 @@ from .claim_schema import (
     QuantityText,
     alternatives,
 )
-from .claim_schema import LEVELS as VALUES
 from .sampling import SAMPLES, runs_of_design
 
 
@@ -449,7 +449,9 @@ class ExperimentSpec(OverrideSpec):
         if self.sampled:
             self._check_sample()
         elif self.points is not None or self.seed is not None:
-            raise ValueError(f"points and seed belong to {listed(SAMPLES, last='or')}; the design is {self.design}")
+            raise ValueError(
+                f"points and seed belong to {listed(SAMPLES, last='or')}; the design is {self.design}"
+            )
         elif self.probabilities:
             raise ValueError(f"probabilities need a design that draws: {listed(SAMPLES, last='or')}")
         else:

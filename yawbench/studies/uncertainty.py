@@ -5,38 +5,38 @@ numbers are those of runs that have one; the others are counted, and never count
 
 | number | interval, 95 % | holds the truth |
 |---|---|---|
-| mean, difference of means | Student (`confidence.interval`) | 95 % of normally distributed numbers, else about |
+| mean, difference of means | Student (`confidence.interval`) | 95 % of normal numbers, else about |
 | standard deviation | jackknife (`confidence.jackknife`) | 80 to 97 % |
-| percentile | order statistics, by the binomial distribution | at least 95 %, of any distribution |
+| percentile | order statistics, by the binomial distribution | at least 95 % |
 | probability | Clopper and Pearson (`confidence.share_bounds`) | at least 95 % |
-| distribution function (figures) | Dvoretzky, Kiefer, Wolfowitz: all of it within ± sqrt(ln 40 / 2n) | at least 95 % |
-| rank correlation | Fisher's z with the variance of Bonett and Wright | about 95 % |
+| distribution function | Dvoretzky, Kiefer, Wolfowitz: ± sqrt(ln 40 / 2n) | at least 95 %, all of it |
+| rank correlation | Fisher's z, variance of Bonett and Wright | about 95 % |
 | Sobol index | linearized (delta method), Student | about 95 %, of many points |
 
 All hold for independent points. Those of a Latin hypercube and of a Sobol sequence lie more evenly, so the
 numbers are better than their intervals say, the most for what is a sum of effects of single quantities.
 
-Sobol indices are the shares of the variance that a quantity explains alone (first), and with all others (total):
+Sobol indices are shares of the variance that a quantity explains alone (first), and with all others (total):
 
-    S_i = mean of f_B (f_ABi - f_A) / V        S_Ti = mean of (f_A - f_ABi)² / 2 V        V: variance of A and B
+    S_i = mean of f_B (f_ABi - f_A) / V        S_Ti = mean of (f_A - f_ABi)² / 2 V        V: variance of A, B
 
 for numbers f around their mean, at points A, B, and A with the values of B on axis i.
 
-Sources: H. A. David, H. N. Nagaraja, Order Statistics, 3rd ed., Wiley (2003), section 7.1. P. Massart, The tight
-constant in the Dvoretzky-Kiefer-Wolfowitz inequality, Annals of Probability 18 (1990) 1269-1283. D. G. Bonett,
-T. A. Wright, Sample size requirements for estimating Pearson, Kendall and Spearman correlations, Psychometrika
-65 (2000) 23-28. A. Saltelli, P. Annoni, I. Azzini, F. Campolongo, M. Ratto, S. Tarantola, Variance based
-sensitivity analysis of model output, Computer Physics Communications 181 (2010) 259-270, table 2 (b) and (f).
-A. B. Owen, Monte Carlo variance of scrambled net quadrature, SIAM J. Numerical Analysis 34 (1997) 1884-1910: a
-Latin hypercube of n points is never worse than n - 1 random ones.
+Sources: H. A. David, H. N. Nagaraja, Order Statistics, 3rd ed., Wiley (2003), section 7.1. P. Massart, The
+tight constant in the Dvoretzky-Kiefer-Wolfowitz inequality, Annals of Probability 18 (1990) 1269-1283. D. G.
+Bonett, T. A. Wright, Sample size requirements for estimating Pearson, Kendall and Spearman correlations,
+Psychometrika 65 (2000) 23-28. A. Saltelli, P. Annoni, I. Azzini, F. Campolongo, M. Ratto, S. Tarantola,
+Variance based sensitivity analysis of model output, Computer Physics Communications 181 (2010) 259-270,
+table 2 (b) and (f). A. B. Owen, Monte Carlo variance of scrambled net quadrature, SIAM J. Numerical Analysis
+34 (1997) 1884-1910: a Latin hypercube of n points is never worse than n - 1 random ones.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -46,7 +46,7 @@ from yawbench.metrics.measures import si
 from .axes import RUN, Level
 from .claim_schema import Assertion
 from .claims import judge
-from .confidence import TAIL, Bounds, ConfidenceInterval, interval, jackknife, share_bounds
+from .confidence import TAIL, ConfidenceInterval, interval, jackknife, share_bounds
 from .experiment import Case, NamedRun
 from .experiment_result import ExperimentResult
 from .sampling import runs_of_design
@@ -57,7 +57,11 @@ PERCENTILES = (1, 5, 10, 25, 50, 75, 90, 95, 99)
 SHOWN = (5, 50, 95)
 """Percentiles in tables for people."""
 MOST_EXACT = 2000
-"""Numbers up to which the interval of a deviation leaves out each in turn; of more, the same is linearized."""
+"""Numbers up to which the interval of a deviation leaves out each in turn; of more, it is linearized."""
+
+
+Drawn = TypeVar("Drawn", np.ndarray, Sequence[Case])
+"""What there is one of for each point."""
 
 
 class Estimate(NamedTuple):
@@ -108,7 +112,7 @@ def numbers_of(findings: ExperimentResult, group: Group, key: str) -> np.ndarray
     return np.array([value.number if value else math.nan for value in values])
 
 
-def independent(findings: ExperimentResult, drawn: Sequence[Any] | np.ndarray) -> Any:
+def independent(findings: ExperimentResult, drawn: Drawn) -> Drawn:
     """Return those of a group's points that do not repeat values of others."""
     points = findings.spec.points or 0
     return drawn[: 2 * points] if findings.spec.design == "saltelli" else drawn
@@ -216,8 +220,7 @@ def sample_tables(findings: ExperimentResult) -> list[Table]:
     if not groups:
         return []
     tables = [_shown_statistics(findings, groups, key) for key in findings.spec.metrics]
-    if findings.spec.probabilities:
-        tables.append(_shown_probabilities(findings, groups))
+    tables += [_shown_probability(findings, groups, name) for name in findings.spec.probabilities]
     differences = differences_of(findings, groups)
     for key in findings.spec.metrics if differences else ():
         tables.append(_shown_differences(findings, differences, key))
@@ -361,14 +364,15 @@ def _probability_rows(
     return rows
 
 
-def _shown_probabilities(findings: ExperimentResult, groups: Sequence[Group]) -> Table:
-    table = Table("Probabilities", ["that", *_names(findings), "runs", "probability"])
-    for group, name, count, missing, estimate in _probability_rows(findings, groups):
-        number = len(independent(findings, group.cases))
-        says = findings.spec.probabilities[name].says.rstrip(".")
-        table.rows.append([says, *group.words, f"{count} of {number}", _with_bounds(estimate, "%")])
-        if missing:
-            table.notes = ["a run without a number counts as one that does not meet its conditions"]
+def _shown_probability(findings: ExperimentResult, groups: Sequence[Group], name: str) -> Table:
+    says = findings.spec.probabilities[name].says.rstrip(".")
+    table = Table(f"Probability: {says}", [*_names(findings), "runs", "probability"])
+    for group, of, count, missing, estimate in _probability_rows(findings, groups):
+        if of == name:
+            number = len(independent(findings, group.cases))
+            table.rows.append([*group.words, f"{count} of {number}", _with_bounds(estimate, "%")])
+            if missing:
+                table.notes = ["a run without a number counts as one that does not meet the conditions"]
     return table
 
 
@@ -422,7 +426,8 @@ def subtracted(findings: ExperimentResult, one: Group, other: Group, key: str) -
     """Return the differences of a metric at the same points, where both groups have it."""
     every = numbers_of(findings, one, key) - numbers_of(findings, other, key)
     drawn: np.ndarray = independent(findings, every)
-    return drawn[np.isfinite(drawn)]
+    kept: np.ndarray = drawn[np.isfinite(drawn)]
+    return kept
 
 
 def _shown_differences(findings: ExperimentResult, differences: Sequence[Difference], key: str) -> Table:
