@@ -63,6 +63,7 @@ if TYPE_CHECKING:
     from ._open import RecordedRuns, open
     from ._run import Run, measured
     from ._scenario import Scenario, load
+    from ._stepping import SteppedRun
     from ._tuning import Tuning, tune
     from ._view import View, view
 
@@ -88,6 +89,7 @@ __all__ = [
     "Scenario",
     "ScenarioError",
     "SimulationError",
+    "SteppedRun",
     "TestQuantity",
     "Tuning",
     "Validation",
@@ -140,6 +142,7 @@ _MODULES = {
     "yawbench._open": ("RecordedRuns", "open"),
     "yawbench._run": ("Run", "measured"),
     "yawbench._scenario": ("Scenario", "load"),
+    "yawbench._stepping": ("SteppedRun",),
     "yawbench._tuning": ("Tuning", "tune"),
     "yawbench._view": ("View", "view"),
 }
