@@ -57,11 +57,13 @@ if TYPE_CHECKING:
     from yawbench.ranking.library import Ranking, rank
 
     from ._controller import Controller
+    from ._distributions import Drawn, normal, tabulated, uniform
     from ._experiment import Experiment, Runs, experiment
     from ._export import export_fmu
     from ._open import RecordedRuns, open
     from ._run import Run, measured
     from ._scenario import Scenario, load
+    from ._stepping import SteppedRun
     from ._tuning import Tuning, tune
     from ._view import View, view
 
@@ -69,6 +71,7 @@ __all__ = [
     "BuildError",
     "Controller",
     "Diagnostic",
+    "Drawn",
     "Evaluation",
     "Experiment",
     "Fit",
@@ -86,6 +89,7 @@ __all__ = [
     "Scenario",
     "ScenarioError",
     "SimulationError",
+    "SteppedRun",
     "TestQuantity",
     "Tuning",
     "Validation",
@@ -100,12 +104,15 @@ __all__ = [
     "linearize",
     "load",
     "measured",
+    "normal",
     "open",
     "output",
     "parameter",
     "rank",
     "signal",
+    "tabulated",
     "tune",
+    "uniform",
     "validate",
     "view",
 ]
@@ -129,11 +136,13 @@ _MODULES = {
     "yawbench.metrics.verdict": ("Verdict",),
     "yawbench.orchestrator.plan": ("Override", "Plan"),
     "yawbench._controller": ("Controller",),
+    "yawbench._distributions": ("Drawn", "normal", "tabulated", "uniform"),
     "yawbench._experiment": ("Experiment", "Runs", "experiment"),
     "yawbench._export": ("export_fmu",),
     "yawbench._open": ("RecordedRuns", "open"),
     "yawbench._run": ("Run", "measured"),
     "yawbench._scenario": ("Scenario", "load"),
+    "yawbench._stepping": ("SteppedRun",),
     "yawbench._tuning": ("Tuning", "tune"),
     "yawbench._view": ("View", "view"),
 }

@@ -190,6 +190,13 @@ class PythonInstance:
         self.component.enter_initialization_mode()
         return self._status()
 
+    def save_state(self) -> dict[str, Any] | None:
+        return self.component._get_fmu_state() if self._status() == OK else None
+
+    def restore_state(self, state: dict[str, Any]) -> bool:
+        self.component._set_fmu_state(state)
+        return self._status() == OK
+
     def exit(self) -> Status:
         self.component.exit_initialization_mode()
         return self._status()

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from yawbench.events.kinds import WarningWatch
 from yawbench.fmus.fmu import Value
-from yawbench.foundation.errors import Diagnostic, ScenarioError
-from yawbench.foundation.messages import short
+from yawbench.foundation.errors import Diagnostic, ResultsError, ScenarioError
+from yawbench.foundation.messages import hint, short
 from yawbench.orchestrator.master.fmi import open_instance
 from yawbench.orchestrator.master.run_lifecycle import OpenInstance
 from yawbench.orchestrator.master.simulate import simulate_in_memory
@@ -20,8 +20,8 @@ from yawbench.orchestrator.results.reader import Results
 from yawbench.orchestrator.scenario.quantities import number_and_unit
 from yawbench.orchestrator.scenario.schema_validation import made
 from yawbench.orchestrator.scenario.yaml_lines import scalar
-from yawbench.studies.axes import DesignAxisSpec, VariantSpec
-from yawbench.studies.claim_schema import MetricSpec, si_number
+from yawbench.studies.axes import SCENARIO, DesignAxisSpec, VariantSpec
+from yawbench.studies.claim_schema import Assertion, MetricSpec, si_number
 from yawbench.studies.experiment import LoadedExperiment as Design
 from yawbench.studies.experiment import NamedRun, experiment_of, metrics_of, plan_experiment
 from yawbench.studies.experiment_result import ExperimentResult
@@ -31,14 +31,16 @@ from yawbench.studies.result_figures import draw_over_axes
 from yawbench.studies.result_files import columns_of
 from yawbench.studies.schema import FigureSpec
 from yawbench.studies.tables import to_pandas
+from yawbench.studies.uncertainty import sample_columns
 
 from . import arguments
 from ._controller import PythonComponent
 from ._dataset import dataset
+from ._distributions import Drawn
 from ._progress import bar
 from ._run import Run, shown_in_notebooks
 from ._run_many import make_all, planner_of
-from ._scenario import Scenario, warn
+from ._scenario import Scenario, load, warn
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -52,21 +54,33 @@ FAR = 1e100
 
 def experiment(
     base: Scenario,
-    axes: Mapping[str, Iterable[object] | Mapping[str, object]],
+    axes: Mapping[str, Iterable[object] | Mapping[str, object] | Drawn],
     *,
     metrics: str | Iterable[str] = (),
+    points: int | None = None,
+    seed: int = 1,
+    design: Literal["sobol", "latin_hypercube", "random", "saltelli"] = "sobol",
 ) -> Experiment:
-    """Return an experiment: runs of a scenario at every combination of levels.
+    """Return an experiment: runs of a scenario at every combination of levels, or over a sample.
 
         >>> axes = {"controller": ["controller_off", "controller_fnn"], "plant.initial_speed": [20, 30]}
         >>> yb.experiment(base, axes, metrics=["peak(sideslip)"])
         <Experiment 'Sideslip tracking at 25 m/s, mu 0.65': 4 runs over controller and plant.initial_speed>
+        >>> uncertain = {"friction": yb.uniform(0.4, 0.9), "vehicle.mass": yb.normal(1100, 50)}
+        >>> made = yb.experiment(base, uncertain, metrics="peak(sideslip)", points=8).run()
+        >>> made.probability("peak(sideslip)", below="10 deg")[["runs", "meeting"]].values.tolist()
+        [[8, 8]]
 
     Args:
         base: the scenario.
         axes: an instance -> FMUs by name or path, or plain Python, as in `Scenario.swap`, or a mapping of
             labels to these, to distinguish objects of a class; a target of `Scenario.set` -> values,
-            numbers in SI or all with the same unit ("80 km/h").
+            numbers in SI or all with the same unit ("80 km/h"), or what they are drawn from (`uniform`,
+            `normal`, `tabulated`); "scenario" -> names or paths of scenarios, in place of the base's. Every
+            combination of levels has the same points drawn.
+        points: number of points drawn, if any axis is drawn; a power of two for "sobol" and "saltelli".
+        seed: of the points.
+        design: "sobol", "latin_hypercube", "random", or "saltelli", from which Sobol indices follow.
         metrics: columns of the table, such as "peak(sideslip)"; default: the standard metrics.
 
     Raises:
@@ -75,18 +89,38 @@ def experiment(
     base = arguments.instance(base, "base", Scenario, "yawbench.load")
     axes = arguments.mapping(axes, "axes", "a mapping of axes to levels, {'plant.mass': [900, 1000]}")
     specs: dict[str, DesignAxisSpec] = {}
+    drawing: dict[str, Any] = {}
+    if any(isinstance(levels, Drawn) for levels in axes.values()):
+        drawing = {"design": arguments.text(design, "design"), "seed": arguments.count(seed, "seed", least=0)}
+        if points is None:
+            raise ScenarioError("points: how many are drawn must be given", code="argument-invalid")
+        drawing["points"] = arguments.count(points, "points")
+    elif points is not None:
+        raise ScenarioError(
+            "points: nothing is drawn; give an axis what it is drawn from, such as uniform(0.3, 1)",
+            code="argument-invalid",
+        )
     changed = base._unswapped(axes)
     for name, levels in axes.items():
+        if isinstance(levels, Drawn):
+            specs[name] = made(DesignAxisSpec, f"axes.{name}", vary=name, **levels.keys)
+            continue
         with arguments.as_scenario_errors():
             labelled = isinstance(levels, Mapping)
-            if labelled and name not in base._loaded.units:
-                raise TypeError(f"{name}: must be a list of values; only instances have labelled levels")
+            if labelled and name not in (*base._loaded.units, SCENARIO):
+                raise TypeError(
+                    f"{name}: must be a list of values; only instances and scenarios have labelled levels"
+                )
             pairs = (
                 list(arguments.mapping(levels, name, "a mapping of labels to levels").items())
                 if labelled
                 else [("", level) for level in arguments.items(levels, name, "a list of levels")]
             )
-        if name in base._loaded.units:
+        if name == SCENARIO and name not in base._loaded.units:
+            files = {label or str(level): _scenario_file(level) for label, level in pairs}
+            variants_of = {words: {"scenario": str(file)} for words, file in files.items()}
+            specs[name] = made(DesignAxisSpec, f"axes.{name}", variants=variants_of)
+        elif name in base._loaded.units:
             variants: dict[str, VariantSpec] = {}
             for label, level in pairs:
                 swapped = changed._swapped({name: level}, label)
@@ -102,15 +136,28 @@ def experiment(
             numbers = numbers_of(name, [level for _, level in pairs])
             specs[name] = made(DesignAxisSpec, f"axes.{name}", vary=name, **numbers)
     wanted = arguments.texts(metrics, "metrics")
-    design = experiment_of(
+    expanded = experiment_of(
         base.path,
         [NamedRun("", "", "", base.path, ())],
         changes=changed.changes,
         axes=specs,
+        drawing=drawing,
         title=base.title or base.path.stem,
         metrics={name: made(MetricSpec, f"metrics.{name}", metric=name) for name in wanted},
     )
-    return Experiment(changed, design)
+    return Experiment(changed, expanded)
+
+
+def _scenario_file(level: object) -> Path:
+    """Return the file of a level of the axis of scenarios."""
+    if isinstance(level, Scenario):
+        if level.changes:
+            raise ScenarioError(
+                "scenario: give scenarios without changes of their own, which all runs would share",
+                code="argument-invalid",
+            )
+        return level.path
+    return load(arguments.path(level, SCENARIO)).path
 
 
 def numbers_of(name: str, items: Iterable[Any]) -> dict[str, Any]:
@@ -234,6 +281,70 @@ class Runs:
     def table(self) -> pd.DataFrame:
         """Table with a row per run: axes, status, reason, metrics, key; `attrs["units"]` has the units."""
         return to_pandas(columns_of(self._findings))
+
+    @property
+    def statistics(self) -> pd.DataFrame:
+        """Mean, deviation and percentiles of each metric over what is drawn, with their intervals."""
+        return self._of_sample("statistics")
+
+    @property
+    def differences(self) -> pd.DataFrame:
+        """Differences of each metric from the first level of each listed axis, at the same points drawn."""
+        return self._of_sample("differences")
+
+    @property
+    def sensitivity(self) -> pd.DataFrame:
+        """Rank correlations of each metric with what is drawn; of the design "saltelli" Sobol indices."""
+        return self._of_sample("sensitivity")
+
+    def probability(
+        self,
+        metric: str,
+        *,
+        below: float | str | None = None,
+        at_most: float | str | None = None,
+        above: float | str | None = None,
+        at_least: float | str | None = None,
+    ) -> pd.DataFrame:
+        """Return the probability that a metric is within a bound, with its interval (Clopper and Pearson).
+
+        A run without a number, because it failed say, is not within.
+
+        Args:
+            metric: a column of the table.
+            below, at_most, above, at_least: the bound, in SI or with a unit; exactly one.
+
+        Raises:
+            ScenarioError: the metric is unknown, or not exactly one bound is given.
+            ResultsError: nothing was drawn.
+        """
+        key = arguments.text(metric, "metric")
+        bounds = {"below": below, "at_most": at_most, "above": above, "at_least": at_least}
+        given = {name: arguments.scalar(x, name) for name, x in bounds.items() if x is not None}
+        condition = {"metric": key, **given}
+        asked = made(Assertion, says=key, holds_if=[condition])
+        if key not in self._findings.spec.metrics:
+            guess = hint(key, self._findings.spec.metrics, lead="metrics")
+            raise ScenarioError(f"metric: there is no {short(key)}{guess}", code="name-unknown")
+        for name, bound in given.items():
+            with arguments.as_scenario_errors(f"{name}:"):
+                si_number(bound, self._findings.unit(key))
+        spec = self._findings.spec.model_copy(update={"probabilities": {str(asked.holds_if[0]): asked}})
+        experiment = replace(self._findings.experiment, spec=spec)
+        return replace(self, _findings=replace(self._findings, experiment=experiment))._of_sample(
+            "probabilities"
+        )
+
+    def _of_sample(self, name: str) -> pd.DataFrame:
+        tables = sample_columns(self._findings)
+        if not tables:
+            raise ResultsError("nothing was drawn: give an axis a distribution", code="results-missing")
+        if name not in tables:
+            raise ResultsError(
+                f"there are no {name}: no listed axis has two levels, or no run has a number",
+                code="results-missing",
+            )
+        return to_pandas(tables[name])
 
     def to_xarray(self) -> xr.Dataset:
         """Return all columns of all runs over the axes and time; `attrs["units"]` of each has its unit.

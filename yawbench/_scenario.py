@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from html import escape
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from yawbench.events.kinds import WarningWatch
 from yawbench.fmus.fmu import Fmu, RunsAs, Value
@@ -40,6 +40,9 @@ from ._progress import bar
 from ._run import Run
 from ._run_many import opener_of, planner_of
 from .planner import Planner
+
+if TYPE_CHECKING:
+    from ._stepping import SteppedRun
 
 
 def load(source: str | Path) -> Scenario:
@@ -286,6 +289,24 @@ class Scenario:
                 raise error from next((getattr(instance, "error", None) for instance in ended), None)
         warn(run._full_title, run.diagnostics)
         return run
+
+    def start(self) -> SteppedRun:
+        """Return a run that is initialized and waits to be stepped.
+
+            >>> with base.start() as s:
+            ...     s.step()
+            ...     s.run_to(0.5)
+            0.001
+            0.5
+
+        A native law that fails is not repeated in Python, as it is by `run`.
+
+        Raises:
+            SimulationError: the run cannot be initialized.
+        """
+        from ._stepping import SteppedRun
+
+        return SteppedRun(self.plan(), opener_of(self._programs))
 
     def _in_python(self, plan: Plan, why: str) -> Plan:
         """Return a plan in which plain Python runs as Python, because it failed natively."""

@@ -86,7 +86,8 @@ class Planner:
         if not record:
             return plan
         recorded = {str(name): name for name in plan.record}
-        unknown = [name for name in record if name not in recorded and "*" not in name]
+        known = {*recorded, *(name.variable for name in plan.record)}
+        unknown = [name for name in record if name not in known and "*" not in name]
         if unknown:
             guess = hint(unknown[0], recorded, lead="recorded are")
             raise ScenarioError(
@@ -95,7 +96,7 @@ class Planner:
         chosen = [
             name
             for text, name in recorded.items()
-            if any(match(pattern, known) is not None for pattern in record for known in (text, name.variable))
+            if any(match(pattern, own) is not None for pattern in record for own in (text, name.variable))
         ]
         return replace(plan, record=tuple(chosen))
 

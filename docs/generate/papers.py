@@ -29,7 +29,7 @@ from yawbench.components.cars.published_cars import PaperA
 from yawbench.figures.display import shown
 from yawbench.foundation.messages import listed
 from yawbench.metrics.verdict import Status, worded
-from yawbench.studies.axes import OpenValueSpec, OpenVariantSpec, levels_of
+from yawbench.studies.axes import OpenValueSpec, VariantSpec, levels_of
 from yawbench.studies.confidence import TAIL, Bounds
 from yawbench.studies.experiment import LoadedExperiment
 from yawbench.studies.load_experiment import load_experiment
@@ -232,7 +232,7 @@ def levels_words(name: str) -> str:
     """Return at how many levels open values are tried one at a time: `2 to 5 levels`."""
     region = study_of(name).spec.region
     assert region
-    values: Iterable[OpenValueSpec | OpenVariantSpec] = region.open_values.values()
+    values: Iterable[OpenValueSpec | VariantSpec] = region.open_values.values()
     numbers = sorted({len(levels_of(one.stepped)) for one in values})
     return f"{numbers[0]} to {numbers[-1]} levels" if len(numbers) > 1 else f"{numbers[0]} levels"
 

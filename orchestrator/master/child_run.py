@@ -94,7 +94,13 @@ class SharedRows:
 
 
 def _make(
-    plan: Plan, opener: OpenInstance, stop: StopFlag, shared: SharedRows, commands: int, answers: int
+    plan: Plan,
+    opener: OpenInstance,
+    stop: StopFlag,
+    shared: SharedRows,
+    pace: float | None,
+    commands: int,
+    answers: int,
 ) -> None:
     """Make a run in this process, which has been forked for it."""
     shared.channel = channel = Channel(commands, answers)
@@ -104,6 +110,7 @@ def _make(
         channel.send("progress", done)
 
     course = RunLifecycle(plan, shared, log, stop, progress, shared.position)
+    course.pace = pace
     error: BaseException | None = None
     inputs: dict[str, Value] = {}
     try:
@@ -166,7 +173,7 @@ class ChildRun(RunLifecycle, Process):
             raise error
 
     def _fork(self, opener: OpenInstance, commands: int, answers: int) -> Child:
-        run = partial(_make, self.plan, opener, self._stop, self._shared, commands, answers)
+        run = partial(_make, self.plan, opener, self._stop, self._shared, self.pace, commands, answers)
         return Child(fork(run, (commands, answers)))
 
     def _report(self, done: int, total: int) -> None:

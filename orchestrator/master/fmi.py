@@ -41,6 +41,7 @@ class Fmi2Instance(CtypesInstance):
     version = 2
     real = "Real"
     exchanging = Kind.EXCHANGE_2
+    state = "FMUstate"
     c_types = {
         "Real": ctypes.c_double,
         "Integer": ctypes.c_int,
@@ -145,6 +146,7 @@ class Fmi3Instance(CtypesInstance):
     version = 3
     real = "Float64"
     exchanging = Kind.EXCHANGE_3
+    state = "FMUState"
     c_types = {
         "Float32": ctypes.c_float,
         "Float64": ctypes.c_double,

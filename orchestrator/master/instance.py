@@ -132,6 +132,8 @@ class CtypesInstance(FmuInstance, ABC):
     """Type, as in the function names, of the values exchanged directly with the master's buffer."""
     exchanging: ClassVar[Kind]
     """Kind of the operation that sets or gets these values."""
+    state: ClassVar[str]
+    """Name of the state in functions that save and restore it."""
     c_types: ClassVar[dict[str, Any]]
     """Type as in the names of setters and getters -> C type."""
 
@@ -180,6 +182,7 @@ class CtypesInstance(FmuInstance, ABC):
         self._may_terminate = False
         self._freed = False
         self._worst = OK
+        self._states: list[int] = []
 
     def renew(self, log: Log, corrupted: set[Path]) -> None:
         """Use an instance that was reset for another run."""
@@ -337,6 +340,20 @@ class CtypesInstance(FmuInstance, ABC):
             status = max(status, self.put(refs, values)) if status <= WARNING else status
         return max(status, self._do("ExitConfigurationMode")) if status <= WARNING else status
 
+    def save_state(self) -> int | None:
+        """Return a handle of the FMU's state; None if it cannot save it. `free` frees all of them."""
+        if not all(self._has(verb + self.state) for verb in ("Get", "Set", "Free")):
+            return None
+        handle = ctypes.c_void_p()
+        if self._do(f"Get{self.state}", ctypes.byref(handle)) > WARNING or handle.value is None:
+            return None
+        self._states.append(handle.value)
+        return handle.value
+
+    def restore_state(self, handle: int) -> bool:
+        """Restore a state; return whether the FMU did."""
+        return self.note(self._do(f"Set{self.state}", ctypes.c_void_p(handle))) <= WARNING
+
     def exit(self) -> Status:
         return self._do("ExitInitializationMode")
 
@@ -352,6 +369,8 @@ class CtypesInstance(FmuInstance, ABC):
             return  # after Fatal no function of any instance may be called (FMI 2.0.4, 2.1.3)
         self._freed = True
         if self._component is not None:
+            for handle in self._states:
+                self._do(f"Free{self.state}", ctypes.byref(ctypes.c_void_p(handle)))
             if self._may_terminate and self._worst < ERROR and self._has("Terminate"):
                 status = self.note(self._do("Terminate"))
                 if status != OK:

@@ -43,6 +43,8 @@ class RecordedRows(Protocol):
         """Record the first `count` rows, which may then be overwritten."""
 
 
+SLICE = 0.05
+"""Time that a run with a pace makes at once [s]; chosen: twenty pictures a second look smooth."""
 REPORT_EVERY = 0.2
 """Time between two reports of progress [s], unless a single step takes longer."""
 
@@ -75,15 +77,22 @@ class RunLifecycle:
         self._stop = stop
         self._progress = progress
         self.position = position or RunPosition().begin()
-        self._master: Master | None = None
+        self.master: Master | None = None
+        self.pace: float | None = None
+        """Simulated seconds per second; None: as fast as possible."""
         self._fmu_instances: dict[str, FmuInstance] = {}
 
     def inputs_of(self, instance: str) -> dict[str, Value]:
         """Return the inputs with which an instance was last stepped."""
-        return {} if self._master is None else self._master.inputs_of(instance)
+        return {} if self.master is None else self.master.inputs_of(instance)
 
     def go(self, opener: OpenInstance) -> None:
         """Open the FMUs, initialize them and step to the end."""
+        self.begin(opener)
+        self.step_to(self.plan.n_steps)
+
+    def begin(self, opener: OpenInstance) -> None:
+        """Open the FMUs and initialize them."""
         corrupted: set[Path] = set()
         process = os.getpid()
         for number, instance in enumerate(self.plan.instances):
@@ -93,26 +102,39 @@ class RunLifecycle:
             self._fmu_instances[instance.name] = opener(instance, self.log, corrupted)
             end_copy_of(process)
             self.position.leave()
-        self._master = Master(self.plan, self._fmu_instances, self.log, self._stop, self.position)
-        self.loop = self._master.loop
+        self.master = Master(self.plan, self._fmu_instances, self.log, self._stop, self.position)
+        self.loop = self.master.loop
         with np.errstate(all="ignore"):  # non-finite values are found by `Master`, not by NumPy warnings
-            self._master.initialize(self._rows.rows[0], self._rows.others)
-            self.passes = self._master.passes
+            self.master.initialize(self._rows.rows[0], self._rows.others)
+            self.passes = self.master.passes
+
+    def step_to(self, point: int) -> None:
+        """Step to a communication point, unless an instance ends the run before."""
+        if self.ended is not None:
+            return
+        assert self.master is not None
+        with np.errstate(all="ignore"):
             try:
-                self._step(self._master)
+                self._step(self.master, point)
             except EndRequested as ending:
                 self.ended = ending
                 self.flush()
 
-    def _step(self, master: Master) -> None:
-        """Step to the end, in stretches short enough to report progress between them."""
+    def go_back(self, point: int, ended: EndRequested | None) -> None:
+        """Note that the run is at an earlier communication point again, up to which rows are written."""
+        self.handed_over, self.ended = point + 1, ended
+
+    def _step(self, master: Master, point: int) -> None:
+        """Step to a point, in stretches short enough to report progress between them."""
         total, stretch, reported = self.plan.n_steps, 1, time.perf_counter()
-        while master.completed < total:
+        begun, first = reported, master.completed
+        slice_ = self.pace and max(1, int(SLICE * self.pace / float(self.plan.step)))
+        while master.completed < point:
             filled = master.completed + 1 - self.handed_over
             if filled == BLOCK:
                 self.flush()
                 filled = 0
-            end = min(total, master.completed + min(stretch, BLOCK - filled))
+            end = min(point, master.completed + min(slice_ or stretch, BLOCK - filled))
             since = master.completed
             try:
                 master.advance(end, self._rows.rows[filled:], self._rows.others)
@@ -121,19 +143,25 @@ class RunLifecycle:
                 raise
             master.check_arithmetic(since)
             now = time.perf_counter()
+            if self.pace:
+                self.flush()
+                due = begun + float((master.completed - first) * self.plan.step) / self.pace
+                while (left := due - time.perf_counter()) > 0.0 and not self._stop.requested:
+                    time.sleep(min(left, SLICE))
             if now - reported < REPORT_EVERY:
                 stretch = min(2 * stretch, BLOCK)
                 continue
             stretch, reported = max(1, stretch // 2), now
             if self._progress is not None:
                 self._progress(master.completed, total)
-        self.flush()
-        if self._progress is not None:
-            self._progress(total, total)
+        if point == total:
+            self.flush()
+            if self._progress is not None:
+                self._progress(total, total)
 
     def flush(self) -> None:
         """Write all complete rows."""
-        completed = -1 if self._master is None else self._master.completed
+        completed = -1 if self.master is None else self.master.completed
         self._hand_over(completed + 1 - self.handed_over)
 
     def _hand_over(self, count: int) -> None:

@@ -84,6 +84,7 @@ def simulate(
     watch: Watch | None = None,
     format: str = "csv",
     apart: bool = False,
+    pace: float | None = None,
 ) -> RunInfo:
     """Run a plan and write its results (`results.csv`) and `run.json` into the folder `out`.
 
@@ -103,6 +104,7 @@ def simulate(
         apart: step the instances in a child process where that is possible (see `child_run`), unless each
             has a process of its own: even if it crashes, the run ends with an error message and the results
             so far.
+        pace: simulated seconds per second; None: as fast as possible.
 
     Raises:
         ScenarioError: `format` is unknown.
@@ -114,6 +116,7 @@ def simulate(
     recorder = recorder_of(format)(Path(out), *_columns(plan))
     apart = apart and can_be_apart() and not keeps(plan) and not isinstance(opener, Isolation)
     run = Simulation(plan, recorder, progress, watch, apart=apart)
+    run.course.pace = pace
     run.make(opener)
     return RunInfo(
         Path(out),
@@ -142,6 +145,18 @@ def simulate_in_memory(
         ScenarioError: the results would take more memory than `IN_MEMORY`.
         ModelDescriptionError, SimulationError: as for `simulate`.
     """
+    recorder = memory_recorder(plan)
+    Simulation(plan, recorder, progress, watch, apart=False).make(opener)
+    assert recorder.results is not None
+    return recorder.results
+
+
+def memory_recorder(plan: Plan) -> MemoryRecorder:
+    """Return a recorder in memory for a run.
+
+    Raises:
+        ScenarioError: the results would take more memory than `IN_MEMORY`.
+    """
     size = 8 * (plan.n_steps + 1) * (len(plan.record) + 1)
     if size > IN_MEMORY:
         what = f"{plan.n_steps:,} steps of {len(plan.record)} variables are {size / 1e9:.3g} GB"
@@ -150,10 +165,7 @@ def simulate_in_memory(
             "write them to a file",
             code="results-too-large",
         )
-    recorder = MemoryRecorder(*_columns(plan), most=plan.n_steps + 1)
-    Simulation(plan, recorder, progress, watch, apart=False).make(opener)
-    assert recorder.results is not None
-    return recorder.results
+    return MemoryRecorder(*_columns(plan), most=plan.n_steps + 1)
 
 
 def _columns(plan: Plan) -> tuple[list[str], list[bool], dict[str, str | None]]:
@@ -187,9 +199,10 @@ class Simulation:
         self.record = run_record(plan, status=RunStatus.RUNNING, started=datetime.now(timezone.utc))
         self.record.id, self.record.key = uuid.uuid4().hex[:12], key_of(plan)
         self._apart = apart
-        self._stop = StopFlag()
+        self.stop = StopFlag()
+        self.notes: list[Diagnostic] = []  # about what its caller has changed during it
         course = ChildRun if apart else RunLifecycle
-        self.course: RunLifecycle = course(plan, recorder, self.log, self._stop, progress)
+        self.course: RunLifecycle = course(plan, recorder, self.log, self.stop, progress)
         self._saved = False
         self._ended_by: str | None = None  # instance
         self._began = time.perf_counter()
@@ -197,8 +210,8 @@ class Simulation:
 
     @property
     def diagnostics(self) -> tuple[Diagnostic, ...]:
-        """Warnings about the course of the run, such as a car that spins."""
-        return self._watch.warnings() if self._watch else ()
+        """What is said of the course of the run, such as that a car spins."""
+        return (*(self._watch.warnings() if self._watch else ()), *self.notes)
 
     @property
     def wall_time(self) -> float:
@@ -206,7 +219,7 @@ class Simulation:
 
     def make(self, opener: OpenInstance) -> None:
         """Make the run; write results and record however it ends, before the instances are freed."""
-        with interrupts(self._stop, self._abandon):
+        with interrupts(self.stop, self.abandon):
             try:
                 self.recorder.announce(self.record)
                 try:
@@ -220,11 +233,11 @@ class Simulation:
                 except BaseException as error:
                     self._fail(error)
                     raise
-                self._save_all()
+                self.save_all()
             finally:
                 self._end()
 
-    def _save_all(self) -> None:
+    def save_all(self) -> None:
         """Write the results of a run that has reached its end, if every row of it was recorded.
 
         Raises:
@@ -238,7 +251,7 @@ class Simulation:
             self._fail(lost)
             raise lost
         try:
-            self._save(RunStatus.COMPLETED)
+            self.save(RunStatus.COMPLETED)
         except ResultsError as error:
             raise self._of_machine(error.diagnostics, error.code) from None
 
@@ -256,7 +269,7 @@ class Simulation:
             error.warnings = self.diagnostics
         try:
             interrupted = isinstance(error, KeyboardInterrupt)
-            self._save(RunStatus.INTERRUPTED if interrupted else RunStatus.FAILED, error)
+            self.save(RunStatus.INTERRUPTED if interrupted else RunStatus.FAILED, error)
         except ResultsError as lost:
             diagnostics += lost.diagnostics
         else:
@@ -264,14 +277,14 @@ class Simulation:
                 sentence = f"What was recorded until then: {self.recorder.written_to}"
                 diagnostics.append(Diagnostic("results-kept", sentence, "info"))
 
-    def _abandon(self) -> None:
+    def abandon(self) -> None:
         """Exit at once after a second signal: an FMU may be hanging."""
         if self._saving or self.course.writing:
             return
         if self._apart:  # a child process is never waited for long
             return
         doing = "while its instances were freed" if self._saved else "inside an instance"
-        error = self._stop.interrupted(doing, time=self.log.time.value)
+        error = self.stop.interrupted(doing, time=self.log.time.value)
         if self.recorder.written_to is None:  # results in memory: the caller's program must go on
             raise error
         try:
@@ -282,7 +295,7 @@ class Simulation:
             print(f"yawbench: {error}; results so far: {results}", file=sys.stderr, flush=True)
             os._exit(error.exit_status)
 
-    def _save(self, status: RunStatus, error: BaseException | None = None) -> None:
+    def save(self, status: RunStatus, error: BaseException | None = None) -> None:
         """Write the record of the run and put the results in place."""
         self._saving = True
         self._ended_by = getattr(error, "instance", None)

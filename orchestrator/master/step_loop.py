@@ -254,6 +254,11 @@ class Master:
                     end = end if self._ending is None else k
                 loop.pass_operation()
 
+    def go_back(self, point: int) -> None:
+        """Note that all values are those of an earlier communication point again."""
+        self.completed = self._position.completed = point
+        self._ending = None
+
     def check_arithmetic(self, since: int) -> None:
         """Check that no FMU has changed the floating-point environment that all instances share.
 

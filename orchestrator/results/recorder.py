@@ -280,6 +280,11 @@ class Columns:
         self.rows = 0
         self._others: list[list[Value]] = []
 
+    def cut(self, rows: int) -> None:
+        """Forget all rows after the first ones."""
+        self.rows = rows
+        del self._others[rows:]
+
     def add(self, block: np.ndarray, others: Sequence[list[Value]]) -> None:
         """Append rows; both arguments are copied."""
         end, (reals, most) = self.rows + len(block), self._room.shape
@@ -330,6 +335,16 @@ class MemoryRecorder(RowBlock):
 
     def _take(self, block: np.ndarray, others: list[list[Value]]) -> None:
         self._columns.add(block, others)
+
+    def mark(self) -> tuple[int, np.ndarray]:
+        """Return where the recorder is, all rows written, for `go_back`."""
+        return self.written, self._extremes.copy()
+
+    def go_back(self, mark: tuple[int, np.ndarray]) -> None:
+        """Forget the rows since a mark."""
+        self.written, self._extremes = mark[0], mark[1].copy()
+        self.others.clear()
+        self._columns.cut(self.written)
 
     def finish(self, record: RunRecord) -> None:
         """Make `results` from the rows written so far."""

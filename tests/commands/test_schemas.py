@@ -165,7 +165,7 @@ BROKEN: list[tuple[str | dict[str, Any], tuple[str | int, ...], Any]] = [
     (f"{A}/study", ("claims", 0, "holds_if", 0, "equals"), 3),
     (f"{A}/study", ("figures", 0, "kind"), "pie"),
     (f"{A}/study", ("keep",), "some"),
-    (f"{A}/sweep", ("design",), "random"),
+    (f"{A}/sweep", ("design",), "haphazard"),
     (f"{A}/sweep", ("points",), 0),
     (f"{A}/sweep", ("axes", "speed", "values"), []),
     (f"{A}/sweep", ("axes", "speed", "vary"), ["plant."]),

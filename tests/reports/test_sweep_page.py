@@ -253,3 +253,45 @@ def test_the_server_shows_the_page_and_what_it_opens(chromium, sweep):
         server.shutdown()
         thread.join()
     bench.close()
+
+
+SAMPLE = """
+title: How sure is it?
+scenario: half.yaml
+design: latin_hypercube
+points: 12
+seed: 1
+axes:
+  speed: {vary: inputs.velocity_x, from: 10, to: 40, says: Speed}
+  amplitude: {vary: driver.amplitude, normal: {mean: 3, deviation: 0.5}, unit: deg, says: Steering}
+  start: {vary: driver.start_time, from: 0.01, to: 0.1, spacing: log}
+  wave: {vary: driver.frequency, values: {0.5: slow, 1: fast}}
+metrics:
+  rate: {metric: peak(yaw_rate_ref), heading: Largest reference}
+"""
+
+
+def test_the_page_of_a_hypercube_shows_all_its_points_where_they_lie(chromium, tmp_path, fmus):
+    (tmp_path / "half.yaml").write_text(HALF_A_CAR)
+    (tmp_path / "sample.yaml").write_text(SAMPLE)
+    out = tmp_path / "out"
+    with pytest.raises(SystemExit):
+        main(["sweep", str(tmp_path / "sample.yaml"), "--out", str(out), "--fmus", str(fmus)])
+    opened(chromium, out / "report.html")
+    assert chromium.console() == []
+    places = chromium.run(
+        VIEW + "return view.places.map(({cell, px, py, map}) => [cell.rows[0], px, py, map])"
+    )
+    assert sorted(row for row, *_ in places) == list(range(24))
+    rows = list(csv.DictReader((out / "table.csv").open()))
+    for panel in (0, 1):
+        mine = [place for place in places if place[3] == panel]
+        assert len(mine) == 12
+        for column, k, way in (("speed [m/s]", 1, 1), ("amplitude [rad]", 2, -1)):
+            values = [way * float(rows[place[0]][column]) for place in mine]
+            assert np.argsort(values).tolist() == np.argsort([place[k] for place in mine]).tolist()
+    assert chromium.run(TEXTS, ".ys-map") == []
+    assert chromium.run("return [...document.querySelectorAll('.ys-panel option')].map((o) => o.value)") == [
+        "",
+        "wave",
+    ]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -254,8 +254,10 @@ MAKING = ("out", "fmus", "no_build", "isolate", "call_limit")
 """Options of commands that make runs."""
 
 
-def plan_of_scenario(scenario: Path, options: RunOptions) -> Plan:
+def plan_of_scenario(scenario: Path, options: RunOptions, record: Sequence[str] = ()) -> Plan:
     """Return the plan of a scenario with the overrides of the options, building its FMUs if necessary.
+
+    `record`: signals to record, or patterns of names; default: those the scenario records.
 
     Raises:
         YawbenchError: the scenario, an option or an FMU is invalid, or a component cannot be built.
@@ -264,7 +266,7 @@ def plan_of_scenario(scenario: Path, options: RunOptions) -> Plan:
 
     planner = Planner(build=options.build)
     loaded = planner.load(scenario, options.changes, validate=not options.no_validate)
-    return planner.plan(loaded, fmus=options.fmus, isolated=options.isolate)
+    return planner.plan(loaded, fmus=options.fmus, isolated=options.isolate, record=record)
 
 
 def pooled(context: typer.Context, options: RunOptions) -> Each:

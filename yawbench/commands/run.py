@@ -17,6 +17,8 @@ from .options import CHANGES, MAKING, RunOptions, ScenarioFile, plan_of_scenario
 from .output import print_tables, say, shows_bars, tabular
 
 if TYPE_CHECKING:
+    from yawbench.orchestrator.master.simulate import Watch
+    from yawbench.orchestrator.plan import Plan
     from yawbench.orchestrator.results.run_record import EventRecord
 
 
@@ -35,8 +37,30 @@ RunName = Annotated[
     typer.Option("--name", metavar="NAME", help="Name of the results folder, below results/."),
 ]
 
+RecordOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--record",
+        metavar="SIGNAL",
+        help="Record only this of the scenario's signals: 'plant.yaw_rate', 'yaw_rate' or 'plant.*'. "
+        "Repeatable.",
+    ),
+]
+LiveOption = Annotated[
+    bool,
+    typer.Option("--live", help="Show curves on the terminal while it runs; without one, a line per second."),
+]
+PaceOption = Annotated[
+    float | None,
+    typer.Option(
+        "--realtime", metavar="FACTOR", help="Simulated seconds per second: 1 is real time, 0.2 slow motion."
+    ),
+]
+
 SHOWN = 5
 """Number of warnings shown; all are in run.json."""
+FASTEST = 1e6
+"""Largest pace [1]; chosen: no run is as fast."""
 BESIDE = 36
 """Columns of the terminal reserved for the bar and its numbers."""
 
@@ -44,7 +68,13 @@ BESIDE = 36
 @tabular
 @takes(*CHANGES, *MAKING, "format_", "no_validate")
 def run(
-    scenario: ScenarioFile, options: RunOptions, name: RunName = None, metric: MetricsOption = None
+    scenario: ScenarioFile,
+    options: RunOptions,
+    name: RunName = None,
+    metric: MetricsOption = None,
+    record: RecordOption = None,
+    live: LiveOption = False,
+    realtime: PaceOption = None,
 ) -> None:
     """Run a scenario and write results.csv and run.json.
 
@@ -52,7 +82,6 @@ def run(
     appended to the name. They replace those of an earlier run, but a failed run never replaces a
     completed one: its results go to failed/ in that folder.
     """
-    from yawbench.events.kinds import RunWatch
     from yawbench.orchestrator.master.compiled_loop import slower_because
     from yawbench.orchestrator.master.isolation import opener_of
     from yawbench.orchestrator.master.log import STATUS, WARNING
@@ -64,8 +93,12 @@ def run(
 
     if options.out and name:
         raise ScenarioError("--out and --name are mutually exclusive", code="option-invalid")
+    if realtime is not None and not 0.0 < realtime < FASTEST:
+        raise ScenarioError(
+            f"--realtime: must be above 0 and below {FASTEST:g} (got {realtime:g})", code="option-invalid"
+        )
     metrics = _metric_names(metric or ())
-    plan = plan_of_scenario(scenario, options)
+    plan = plan_of_scenario(scenario, options, record or ())
     output.note(plan.diagnostics)
     if named := [name for name in metric or () if name != "standard"]:
         from yawbench.metrics import expressions
@@ -82,15 +115,20 @@ def run(
         say(f"changed: {changed(plan.changes)}")
     title = with_changes(plan.title or scenario.stem, plan.changes)
     try:
-        with _bar(title) as progress, opener_of(plan, options.limit) as opener:
+        with (
+            _seen(plan, live) as watch,
+            _bar(title, wanted=not live) as progress,
+            opener_of(plan, options.limit) as opener,
+        ):
             info = simulate(
                 plan,
                 folder,
                 progress=progress,
                 opener=opener,
-                watch=RunWatch(plan),
+                watch=watch,
                 format=options.format_,
                 apart=True,
+                pace=realtime,
             )
     except SimulationError as error:
         _say_warnings(error.warnings)
@@ -150,13 +188,28 @@ def _metric_names(texts: Sequence[str]) -> list[str]:
 
 
 @contextlib.contextmanager
-def _bar(title: str) -> Iterator[Callable[[int, int], None] | None]:
+def _seen(plan: Plan, live: bool) -> Iterator[Watch]:
+    """Yield the observer of a run, which shows its curves if it is `live`."""
+    from yawbench.events.kinds import RunWatch
+
+    watch = RunWatch(plan)
+    if not live:
+        yield watch
+        return
+    from .live import Live
+
+    with Live(plan, watch, terminal=shows_bars()) as shown:
+        yield shown
+
+
+@contextlib.contextmanager
+def _bar(title: str, *, wanted: bool = True) -> Iterator[Callable[[int, int], None] | None]:
     """Show a progress bar on a terminal while the block runs, and nothing elsewhere.
 
     It redraws only when the run reports progress: a bar with a thread of its own would take the interpreter
     lock away from the FMUs.
     """
-    if not shows_bars():
+    if not (wanted and shows_bars()):
         yield None
         return
     from rich.console import Console

@@ -55,6 +55,7 @@ from yawbench.studies.result_tables import (
 from yawbench.studies.schema import FigureSpec
 from yawbench.studies.sections import sections
 from yawbench.studies.tables import Cell, Table
+from yawbench.studies.uncertainty import sample_tables
 
 from .comparison import ComparisonView
 from .diagram import diagram, systems_of
@@ -207,7 +208,7 @@ def chapter(
         sweep=sweep,
         figures=figure_files(findings),
         charts=charts(findings, folder / FIGURES),
-        tables=[*run_tables(findings), *derived_tables(findings, apart=True)],
+        tables=[*run_tables(findings), *derived_tables(findings, apart=True), *sample_tables(findings)],
         definitions=definitions(findings),
         groups=groups,
         kinds=count_kinds(groups),
@@ -490,16 +491,17 @@ def figure_files(findings: ExperimentResult) -> list[tuple[str, str]]:
     return [
         (title_of(findings, spec), f"{FIGURES}/{spec.name}")
         for spec in findings.spec.figures
-        if spec.what.over_axes or (spec.what.shows == "runs" and runs_of(findings, spec))
+        if (spec.what.over_axes and not spec.what.of_sample)
+        or (spec.what.shows == "runs" and runs_of(findings, spec))
     ]
 
 
 def charts(findings: ExperimentResult, folder: Path) -> list[FigureImage]:
-    """Return the drawn figures of grids as images; the view of the sweep shows those over axes."""
+    """Return the drawn figures of grids and samples as images; the view of the sweep shows the others."""
     drawn = []
     for spec in findings.spec.figures:
         file = folder / f"{spec.name}.svg"
-        if spec.what.shows == "grid" and file.is_file():
+        if (spec.what.shows == "grid" or spec.what.of_sample) and file.is_file():
             drawn.append(image_of(file, title_of(findings, spec)))
     return drawn
 

@@ -27,7 +27,7 @@ from yawbench.orchestrator.results.reader import load_results
 from yawbench.orchestrator.results.run_record import RUN_FILE
 from yawbench.studies.axes import RUN, Level, changes_at
 from yawbench.studies.claim_schema import MetricReference, si_number
-from yawbench.studies.experiment import Case
+from yawbench.studies.experiment import Case, LoadedExperiment
 from yawbench.studies.experiment_result import Each, ExperimentResult
 from yawbench.studies.jobs import NOT_MADE, Job
 from yawbench.studies.limits import Limit, limits_of
@@ -199,11 +199,20 @@ def _axes(findings: ExperimentResult) -> Iterator[tuple[dict[str, Any], list[int
             "numbers": [_number(level) for level in levels] if axis.numeric else None,
             "log": axis.spacing == "log",
             "repeats": axis.repeats,
+            "drawn": name in findings.spec.drawn,
+            "scenarios": _scenarios(experiment, k, levels),
             "options": [_words(changes_at(axis, level, experiment.path.parent)) for level in levels],
             "applies": applies,
         }
         index = {level: number for number, level in enumerate(levels)}
         yield about, [index[case.point[k]] for case in experiment.cases]
+
+
+def _scenarios(experiment: LoadedExperiment, axis: int, levels: Sequence[Level]) -> list[str] | None:
+    """Return the scenario of each level of an axis; None if these leave that of the run."""
+    spec = [*experiment.spec.axes.values()][axis]
+    named = [spec.variants[str(level.value)].scenario if spec.variants else "" for level in levels]
+    return [str(experiment.path.parent / one) if one else "" for one in named] if any(named) else None
 
 
 def _texts(levels: Sequence[Level]) -> list[str]:
@@ -247,7 +256,7 @@ def _chosen(findings: ExperimentResult) -> dict[str, Any]:
     limits: dict[str, dict[str, Any]] = {}
     bounds = [
         (condition.metric, condition.bound, condition.relation in ("below", "at_most"))
-        for limit in spec.limits.values()
+        for limit in (*spec.limits.values(), *spec.probabilities.values())
         for condition in limit.holds_if
     ]
     bounds += [
@@ -269,8 +278,19 @@ def _chosen(findings: ExperimentResult) -> dict[str, Any]:
         of = next((limit.of for limit in spec.limits.values()), "")
         others = [k for k in names if k != of]
         first = [*others[:1], of, *others[1:2]] if of else names[:3]
+    if spec.sampled and not drawn:  # what is drawn makes the map, and a listed axis its panels
+        first = [
+            *spec.drawn[:2],
+            *([""] if len(spec.drawn) == 1 else []),
+            *(k for k in named if k not in spec.drawn),
+        ]
+        return {
+            "limits": limits,
+            "metric": next(iter(limits), "") or next(iter(spec.metrics), ""),
+            "map": first[:3],
+        }
     first = [k for k in dict.fromkeys(first) if k]
-    first += [k for k in names if k not in first]
+    first += [k for k in names if k not in first and k not in spec.drawn]
     return {
         "limits": limits,
         "metric": (drawn.metric if drawn else "") or next(iter(limits), "") or next(iter(spec.metrics), ""),

@@ -1,7 +1,8 @@
 """Axes of an experiment: their schema, the points of a design, and the overrides at each point.
 
-A design is a full grid, a list or a Latin hypercube. A region has axes, too: the values that a paper
-leaves open, with the range over which claims are judged again.
+A design is a full grid, a list or a sample (`sampling`): then axes with a range or a distribution are drawn,
+and every value of the others is combined with all points drawn. A region has axes, too: the values that a
+paper leaves open, with the range over which claims are judged again.
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ from yawbench.orchestrator.signal_names import INPUTS, OF_RUN, VEHICLE, Target
 from .claim_schema import LEVELS as VALUES
 from .claim_schema import Number, Patterns, is_finite, text_of
 from .on_demand import OnDemand
+from .sampling import Distribution, Normal, Tabulated, Uniform, table_of
 
 MOST = 100_000
 """Largest number of runs in an experiment; chosen: more is a typo, and planning them takes minutes."""
@@ -103,7 +105,11 @@ class OverrideSpec(StrictModel):
 
 
 class VariantSpec(OverrideSpec):
-    """A named group of overrides."""
+    """A named group of overrides; an empty one changes nothing."""
+
+    scenario: str = Field(
+        "", description="In place of a run's own, whose name is `{scenario}`; relative to this file"
+    )
 
 
 class AxisSpec(StrictModel):
@@ -118,10 +124,20 @@ class AxisSpec(StrictModel):
     values: Levels | None = Field(None, description="A list, or a mapping of values to words")
     start: Number | None = Field(None, alias="from", description="The first of `count` values")
     end: Number | None = Field(None, alias="to", description="The last")
-    count: int | None = Field(None, ge=2, le=MOST, description="Number of values; not for a Latin hypercube")
+    count: int | None = Field(
+        None, ge=2, le=MOST, description="Number of values; without it the range is drawn from"
+    )
     spacing: Literal["linear", "log"] = Field("linear", description="Equal steps or equal factors")
     unit: str | None = Field(None, description="Unit of the numbers; default: that of the parameter")
     says: str = Field("", description="Label in figures; default: the parameter in words")
+
+    @property
+    def distribution(self) -> Distribution | None:
+        """What is drawn; None: listed values, or a counted range."""
+        listed = self.values is not None or self.variants or self.count is not None
+        if listed or self.start is None or self.end is None:
+            return None
+        return Uniform(self.start, self.end, self.spacing == "log")
 
     @property
     def kind(self) -> AxisKind:
@@ -141,6 +157,16 @@ class AxisSpec(StrictModel):
         """The number of values; None for a range without a count."""
         levels = self.variants or self.values
         return self.count if levels is None else len(levels)
+
+    @property
+    def drawn(self) -> bool:
+        """Whether its values are drawn."""
+        return self._describes or self.distribution is not None
+
+    @property
+    def _describes(self) -> bool:
+        """Whether it describes a distribution other than its range."""
+        return False
 
     @property
     def numeric(self) -> bool:
@@ -168,11 +194,12 @@ class AxisSpec(StrictModel):
         if self.values is not None and (ends != (None, None) or self.count is not None):
             raise ValueError("give either values, or from, to and count")
         if self.values is None:
-            if None in ends:
+            if None in ends and not self._describes:
                 raise ValueError("needs values, or from, to and count")
             if self.kind != "setting":
                 raise ValueError(f"{self.vary[0]} takes names: give values, not from and to")
-            self._check_ends()
+            if None not in ends:
+                self._check_ends()
         elif self.kind != "setting" and not all(isinstance(value, str) for value in self.values):
             raise ValueError(f"values: {self.vary[0]} takes names of files or FMUs")
         if self.unit is not None:
@@ -194,15 +221,77 @@ class AxisSpec(StrictModel):
             raise ValueError("from and to must both be above 0, or both below, for spacing log")
 
 
+class NormalSpec(StrictModel):
+    """A normal distribution; `from` and `to` of the axis, one or both, truncate it."""
+
+    mean: Number = Field(description="In the unit of the axis")
+    deviation: Annotated[Number, Field(gt=0)] = Field(description="Standard deviation")
+
+
+def _table(value: object) -> Any:
+    """Normalize a table of a distribution: to pairs of value and cumulative share, or a file."""
+    if isinstance(value, str) and value:
+        return value
+    if not isinstance(value, (list, tuple)) or not value:
+        raise ValueError(
+            "must be a list of values, of pairs [value, cumulative share], or a CSV file of one or both"
+        )
+    return table_of(value)
+
+
+_TABLE_JSON: dict[str, Any] = {
+    "anyOf": [
+        {"type": "string"},
+        {"type": "array", "items": {"anyOf": [
+            {"type": "number"}, {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2},
+        ]}, "minItems": 2},
+    ]
+}  # fmt: skip
+
+
 class DesignAxisSpec(AxisSpec):
     """An axis of an experiment's design."""
 
+    normal: NormalSpec | None = Field(None, description="Values are drawn from a normal distribution")
+    table: Annotated[Any, PlainValidator(_table), WithJsonSchema(_TABLE_JSON)] = Field(
+        None,
+        description="Values are drawn from a table: measured values, of which each is as likely, pairs of a "
+        "value and the share of values up to it, straight between them, or a CSV file of one or both",
+    )
+    whole: bool = Field(False, description="Whether drawn values are rounded to whole numbers, as for seeds")
     runs: Patterns = Field(["*"], description="Which runs it changes; the others are the same all along it")
     repeats: bool = Field(
         False,
         description="Whether its values, seeds say, make repeats of one and the same: every number is then "
         "the mean over them, with its confidence interval; listed, with at least 2 of them",
     )
+
+    @property
+    def distribution(self) -> Distribution | None:
+        """What is drawn; None: listed values, or a counted range."""
+        if self.normal:
+            return Normal(self.normal.mean, self.normal.deviation, self.start, self.end)
+        return Tabulated(self.table) if isinstance(self.table, tuple) else super().distribution
+
+    @property
+    def _describes(self) -> bool:
+        return self.normal is not None or self.table is not None
+
+    @model_validator(mode="after")
+    def _drawn(self) -> DesignAxisSpec:
+        if self.normal and self.table is not None:
+            raise ValueError("give either normal or table")
+        if self._describes and (self.values is not None or self.count is not None or self.variants):
+            raise ValueError("normal and table take no values, count or variants")
+        if self.table is not None and (self.start, self.end) != (None, None):
+            raise ValueError("table: takes no from and to")
+        if self._describes and self.spacing == "log":
+            raise ValueError("spacing: is of ranges, not of normal or table")
+        if self.whole and not self.drawn:
+            raise ValueError("whole: is of drawn values: a range without count, normal or table")
+        if self.normal:
+            self.distribution.check()  # type: ignore[union-attr]
+        return self
 
     @model_validator(mode="after")
     def _repeated(self) -> DesignAxisSpec:
@@ -219,20 +308,9 @@ LEVELS = 5
 """Levels of an open value given as a range. Chosen: enough to interpolate linearly between neighbours."""
 
 
-class OpenVariantSpec(VariantSpec):
-    """A named group of overrides; an empty one is the chosen point."""
-
-    scenario: str = Field(
-        "", description="In place of a run's own, whose name is `{scenario}`; relative to this file"
-    )
-
-
 class OpenValueSpec(AxisSpec):
     """A value that the paper leaves open: an axis on which every run already has its chosen value."""
 
-    variants: dict[str, OpenVariantSpec] = Field(  # type: ignore[assignment]
-        {}, description="Words -> changes that belong together"
-    )
     times: bool = Field(False, description="Whether the values are factors on what each run has")
     runs: Patterns = Field(["*"], description="Which runs it may touch; those that set it themselves keep it")
     because: str = Field(description="Why this range: a source, or `chosen:` and why", min_length=1)
@@ -281,6 +359,8 @@ class RegionSpec(StrictModel):
         return (*range(self.points, self.most, self.points), self.most)
 
 
+SCENARIO = "scenario"
+"""Name of the axis of scenarios, where a file names several."""
 RUN = "run"
 """Name of the axis of named runs in figures and tables."""
 DesignPoint = tuple["Level", ...]
@@ -352,40 +432,38 @@ def _level(number: float) -> Level:
     return Level(number, f"{number:.6g}")
 
 
-def latin_hypercube(
-    axes: Sequence[AxisSpec], runs: int, seed: int, *, most: int = 0
-) -> Sequence[DesignPoint]:
-    """Return a Latin hypercube: on every axis, each of `runs` equal parts of the range holds one point.
+def points_at(axes: Sequence[AxisSpec], positions: np.ndarray) -> Sequence[DesignPoint]:
+    """Return the points at relative positions, 0 to 1: an array of (points, axes).
 
-    It is extended to `most` points, if these are more. An axis of listed values takes each of them equally
-    often, up to the remainder of the division.
+    An axis of listed values takes each of them equally often, up to the remainder of the division.
     """
-    positions = hypercube(len(axes), runs, max(runs, most), seed)
-    return OnDemand(range(len(positions)), partial(_in_hypercube, axes, positions))
+    return OnDemand(range(len(positions)), partial(_at_position, axes, positions))
 
 
-def _in_hypercube(axes: Sequence[AxisSpec], positions: np.ndarray, number: int) -> DesignPoint:
+def _at_position(axes: Sequence[AxisSpec], positions: np.ndarray, number: int) -> DesignPoint:
     pairs = zip(axes, positions[number], strict=True)
     return tuple(level_at(axis, float(position)) for axis, position in pairs)
 
 
-def hypercube(axes: int, runs: int, most: int, seed: int) -> np.ndarray:
-    """Return relative positions, 0 to 1, of a Latin hypercube that is extended: an array of (most, axes).
+def crossed(axes: Sequence[AxisSpec], positions: np.ndarray) -> Sequence[DesignPoint]:
+    """Return the points of a sample: all combinations of listed values, each with the same points drawn.
 
-    The first `runs` rows are a Latin hypercube, and so are the first 2, 4, 8 ... times as many: when each
-    part of a range is halved, the new points fill the halves that have none. So no point is ever given up.
-    Source: M. D. McKay, R. J. Beckman, W. J. Conover, Technometrics 21 (1979) 239-245; for the extension
-    C. J. Sallaberry, J. C. Helton, S. C. Hora, Reliability Engineering and System Safety 93 (2008) 1047-1059.
+    Args:
+        axes: of the design, in order.
+        positions: relative positions on the axes that are drawn, shape (points, such axes); these vary
+            fastest.
     """
-    generator = np.random.Generator(np.random.PCG64(seed))
-    draws = [(generator.permutation(runs) + generator.random(runs)) / runs for _ in range(axes)]
-    positions = np.stack(draws, axis=1)
-    while len(positions) < most:
-        parts = 2 * len(positions)
-        free = [np.setdiff1d(np.arange(parts), (column * parts).astype(int)) for column in positions.T]
-        more = [(generator.permutation(halves) + generator.random(len(halves))) / parts for halves in free]
-        positions = np.concatenate([positions, np.stack(more, axis=1)])
-    return positions[:most]
+    listed = grid([levels_of(axis) for axis in axes if not axis.drawn])
+    drawn = points_at([axis for axis in axes if axis.drawn], positions)
+    return OnDemand(range(len(listed) * len(drawn)), partial(_crossed, axes, listed, drawn))
+
+
+def _crossed(
+    axes: Sequence[AxisSpec], listed: Sequence[DesignPoint], drawn: Sequence[DesignPoint], number: int
+) -> DesignPoint:
+    combination, draw = divmod(number, len(drawn))
+    of_listed, of_drawn = iter(listed[combination]), iter(drawn[draw])
+    return tuple(next(of_drawn if axis.drawn else of_listed) for axis in axes)
 
 
 def level_at(axis: AxisSpec, position: float) -> Level:
@@ -393,12 +471,9 @@ def level_at(axis: AxisSpec, position: float) -> Level:
     if axis.variants or axis.values is not None or axis.count is not None:
         levels = levels_of(axis)
         return levels[min(int(position * len(levels)), len(levels) - 1)]
-    assert axis.start is not None
-    assert axis.end is not None
-    if axis.spacing == "log":
-        size = math.exp((1 - position) * math.log(abs(axis.start)) + position * math.log(abs(axis.end)))
-        return _level(math.copysign(size, axis.start))
-    return _level((1 - position) * axis.start + position * axis.end)
+    assert axis.distribution is not None
+    number = axis.distribution.at(position)
+    return Level(round(number), str(round(number))) if getattr(axis, "whole", False) else _level(number)
 
 
 def changes_at(

@@ -58,6 +58,8 @@ class Drawing:
     """Title of the drawn quantity, without its unit."""
     upwards = ""
     """Label of the y axes."""
+    across = ""
+    """Label of the x axes of a drawing that has no axis there."""
 
     def __init__(self, findings: ExperimentResult, spec: FigureSpec) -> None:
         self.findings = findings
@@ -251,12 +253,12 @@ class MetricDrawing(ValueDrawing):
 
 
 class CurveDrawing(MetricDrawing):
-    """A metric over an axis: a line, or for a Latin hypercube points, for each level of `lines`."""
+    """A metric over an axis: a line, or for a sample points, for each level of `lines`."""
 
     def fill(self, axes: Axes, runs: Sequence[Case]) -> None:
         for level, style in self.lines():
             mine = [run for run in runs if level is None or self.at(run, self.spec.lines) == level]
-            if self.findings.spec.design == "latin_hypercube":
+            if self.findings.spec.sampled:
                 style["linestyle"] = ""
             self.draw_line(
                 axes,

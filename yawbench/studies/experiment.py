@@ -24,11 +24,12 @@ from yawbench.orchestrator.wiring.context import reached
 from yawbench.planner import Planner
 from yawbench.vocabulary.facts import FACTS
 
-from .axes import AxisSpec, DesignAxisSpec, DesignPoint, Level, changes_at, grid, latin_hypercube, levels_of
+from .axes import AxisSpec, DesignAxisSpec, DesignPoint, Level, changes_at, crossed, grid, levels_of
 from .claim_schema import MetricReference, MetricSpec, si_number
 from .jobs import Job, MetricRequests, TestRequest, key_of, plans_of
 from .on_demand import OnDemand
 from .references import problems_of, refuse
+from .sampling import positions
 from .schema import ExperimentSpec, RunSpec
 from .sections import sections
 
@@ -67,6 +68,11 @@ class Case:
     def changes(self) -> tuple[Override, ...]:
         """The overrides of its scenario."""
         return self.experiment.changes_of(self.run, self.point)
+
+    @property
+    def scenario(self) -> Path:
+        """Its scenario: that of a variant, if one replaces the run's."""
+        return self.experiment.scenario_of(self.run, self.point)
 
     @property
     def label(self) -> str:
@@ -108,13 +114,17 @@ class LoadedExperiment(LoadedFile):
 
     @cached_property
     def points(self) -> Sequence[DesignPoint]:
-        """All points of the design, one without axes; in a grid the last axis varies fastest."""
+        """All points of the design, one without axes; in a grid the last axis varies fastest.
+
+        In a sample, the points drawn follow each other for every combination of the listed values.
+        """
         if self.design:
             return list(dict.fromkeys(point for _, point in self.design))
         axes = list(self.spec.axes.values())
-        if self.spec.design == "latin_hypercube":
+        if self.spec.sampled:
             assert self.spec.points is not None and self.spec.seed is not None
-            return latin_hypercube(axes, self.spec.points, self.spec.seed)
+            drawn = sum(axis.drawn for axis in axes)
+            return crossed(axes, positions(self.spec.design, drawn, self.spec.points, self.spec.seed))
         levels = [*map(levels_of, axes)]
         return grid(levels) if self.spec.design == "grid" else list(zip(*levels, strict=True))
 
@@ -139,6 +149,15 @@ class LoadedExperiment(LoadedFile):
     def changes_of(self, run: NamedRun, point: DesignPoint) -> tuple[Override, ...]:
         """Return the overrides of a run at a point."""
         return (*self.for_all, *run.changes, *self.by_options, *self._at(point, run))
+
+    def scenario_of(self, run: NamedRun, point: DesignPoint) -> Path:
+        """Return the scenario of a run at a point."""
+        scenario = run.scenario
+        for axis, level in zip(self.spec.axes.values(), point, strict=True):
+            named = axis.variants[str(level.value)].scenario if axis.variants else ""
+            if named and any(fnmatchcase(run.name, pattern) for pattern in axis.runs):
+                scenario = self.path.parent / named.replace("{scenario}", run.scenario.stem)
+        return scenario
 
     def setting(self, point: DesignPoint) -> DesignPoint:
         """Return a point without the axes of repeats."""
@@ -224,6 +243,7 @@ def experiment_of(
     changes: Sequence[Override] = (),
     axes: Mapping[str, DesignAxisSpec] | None = None,
     design: Sequence[tuple[str, DesignPoint]] = (),
+    drawing: Mapping[str, Any] | None = None,
     origin: OverrideOrigin = "sweep",
     **keys: Any,
 ) -> LoadedExperiment:
@@ -234,6 +254,7 @@ def experiment_of(
         runs: the named runs, or one without a name.
         changes: overrides of all runs.
         axes, design, origin: see `LoadedExperiment`.
+        drawing: of a sample, `design`, `points` and `seed` of the schema.
         keys: of the schema: its title, metrics, figures, ... as specifications.
 
     Raises:
@@ -244,7 +265,7 @@ def experiment_of(
         keys["scenario"] = named[""].scenario.name
     else:
         keys["runs"] = [made(RunSpec, name=name, scenario=run.scenario.name) for name, run in named.items()]
-    spec = made(ExperimentSpec, **keys, axes={} if design else axes or {})
+    spec = made(ExperimentSpec, **keys, **(drawing or {}), axes={} if design else axes or {})
     if design:  # its points are not those of all axes
         spec = spec.model_copy(update={"axes": axes or {}})
     refuse(problems_of(spec, named))
@@ -331,7 +352,7 @@ def plan_experiment(
 
     def job(case: Case, out: Path, **of_plan: Any) -> Job:
         return Job(
-            case.label, case.run.scenario, out, case.changes, keep=keep or not axes, test=case.run.test,
+            case.label, case.scenario, out, case.changes, keep=keep or not axes, test=case.run.test,
             **of_plan, **of_jobs,
         )  # fmt: skip
 

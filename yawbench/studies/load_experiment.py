@@ -28,6 +28,7 @@ from .axes import changes_of_file
 from .claim_schema import Claim, DerivedSpec
 from .experiment import FIGURES, LoadedExperiment, NamedRun
 from .references import problems_of
+from .sampling import read_table
 from .schema import ChoiceSpec, ExperimentSpec, RunSpec
 from .sections import sections
 
@@ -85,7 +86,7 @@ def load_experiment(path: Path | str, *, changes: Sequence[Override] = ()) -> Lo
     path = Path(path)
     document = yaml_lines.read(path, what="experiment file")
     spec = validated(ExperimentFile, document)
-    spec = expanded(spec, document)
+    spec = with_tables(expanded(spec, document), document)
     runs = {"": NamedRun("", "", "", path.parent / spec.scenario, ())} if spec.scenario else {}
     for i, entry in enumerate(spec.runs):
         for run in named_runs(document, i, entry):
@@ -181,6 +182,20 @@ def expanded(spec: ExperimentSpec, document: Document) -> ExperimentSpec:
                 every.append(binding.filled(claim))
                 every[-1]._number = i
     return spec.model_copy(update={"derived": derived, **expanded_claims})
+
+
+def with_tables(spec: ExperimentSpec, document: Document) -> ExperimentSpec:
+    """Return the file with the tables of distributions that it names in place of their names."""
+    axes = dict(spec.axes)
+    for name, axis in spec.axes.items():
+        if isinstance(axis.table, str):
+            try:
+                table = read_table(document.path.parent / axis.table)
+            except ValueError as error:
+                document.report(("axes", name, "table"), str(error), "file-unreadable")
+            else:
+                axes[name] = axis.model_copy(update={"table": table})
+    return spec.model_copy(update={"axes": axes})
 
 
 def named_runs(document: Document, i: int, entry: RunSpec) -> Iterator[NamedRun]:

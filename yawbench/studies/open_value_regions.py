@@ -22,7 +22,7 @@ from yawbench.orchestrator.signal_names import Target
 from yawbench.orchestrator.wiring.context import found_at
 from yawbench.planner import Planner
 
-from .axes import DesignPoint, Level, OpenValueSpec, OpenVariantSpec, changes_at, latin_hypercube, levels_of
+from .axes import DesignPoint, Level, OpenValueSpec, VariantSpec, changes_at, levels_of, points_at
 from .claim_schema import Claim, MetricReference
 from .claims import ONE_IN, TIMES, LevelVerdict, OpenValueScan, Region, judge
 from .confidence import Decision, SequentialTest
@@ -30,6 +30,7 @@ from .derived import derive, ranked
 from .experiment import RUNS, LoadedExperiment, NamedRun, PlannedExperiment, metrics_of, number_of
 from .experiment_result import ExperimentResult
 from .jobs import Job, MeasuredRun, keyed, ready
+from .sampling import hypercube
 
 ORIGIN: Final = "region"
 """Origin of overrides that open values make."""
@@ -109,7 +110,7 @@ class RegionRuns:
             for target in targets
         )
 
-    def _scenario(self, variant: OpenVariantSpec, run: NamedRun) -> Path:
+    def _scenario(self, variant: VariantSpec, run: NamedRun) -> Path:
         """Return the scenario of a run at a variant."""
         named = variant.scenario.replace("{scenario}", run.scenario.stem)
         return self.experiment.path.parent / named if named else run.scenario
@@ -243,9 +244,10 @@ def plan_region(planned: PlannedExperiment, folder: Path, *, planner: Planner) -
     region = spec.region
     assert region is not None
     continuous = [open_value.continuous for open_value in runs.open_values.values()]
-    hypercube = latin_hypercube(continuous, region.points, region.seed, most=region.most)
+    drawn = hypercube(len(continuous), region.points, max(region.points, region.most), region.seed)
+    points = points_at(continuous, drawn)
     questions = {
-        (group, number): _asked(runs, claim, hypercube)
+        (group, number): _asked(runs, claim, points)
         for group, claims in (("claims", spec.claims), ("checks", spec.checks))
         for number, claim in enumerate(claims)
     }

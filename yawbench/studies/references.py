@@ -142,7 +142,11 @@ def _in_names(spec: ExperimentSpec, runs: Collection[str]) -> Iterator[Problem]:
     for group, number, claim in spec.assertions():
         yield from _unknown(spec, runs, named_in(claim, (group, number)))
     for key, condition in spec.conditions():
-        if not (condition.derived or condition.run) and spec.runs and key[0] != "limits":
+        if (
+            not (condition.derived or condition.run)
+            and spec.runs
+            and key[0] not in ("limits", "probabilities")
+        ):
             yield Problem(key, "needs run and metric, or derived in place of both", "figure-invalid")
     for name, grid in spec.grids.items():
         what = "derived number" if grid.derived else "run"
@@ -189,7 +193,7 @@ def _in_figure(spec: ExperimentSpec, figure: FigureSpec) -> Iterator[Problem]:
         yield Problem(("kind",), "runs along axes are drawn as curve, map or limit", "figure-invalid")
     for name, chosen in figure.only.items():
         axis = spec.axes.get(name)
-        if axis is None or (spec.design == "latin_hypercube" and axis.numeric):
+        if axis is None or (spec.sampled and axis.drawn):
             continue
         levels = levels_of(axis)
         names = {text for level in levels for text in names_of(axis, level)}
@@ -199,18 +203,36 @@ def _in_figure(spec: ExperimentSpec, figure: FigureSpec) -> Iterator[Problem]:
     for key, name in figure.axes.items() if figure.what.over_axes else ():
         if name in spec.repeats:
             yield Problem((key,), f"numbers are means over {name!r}", "figure-invalid")
+        if figure.what.of_sample and name in spec.drawn:
+            yield Problem(
+                (key,), f"the values of {name!r} are drawn: nothing is said of each", "figure-invalid"
+            )
         if key in "xy" and name in spec.axes and figure.what.upwards and not spec.axes[name].numeric:
             yield Problem((), f"the values of {name!r} must be numbers", "figure-invalid")
+    if figure.what.of_sample and not spec.sampled:
+        yield Problem(("kind",), f"a {figure.kind} needs a design that draws", "figure-invalid")
+    if figure.against:
+        known = {text for level in _levels_in(spec, figure.lines) for text in level}
+        if figure.against not in known:
+            guess = hint(figure.against, known, lead="lines has") if known else ": give lines, which has it"
+            yield Problem(("against",), f"there is no value {figure.against!r}{guess}", "figure-invalid")
     if figure.limit in spec.limits and (of := spec.limits[figure.limit].of) in figure.axes.values():
         yield Problem((), f"{of!r} is the axis of the limit {figure.limit!r}", "figure-invalid")
 
 
+def _levels_in(spec: ExperimentSpec, axis: str) -> list[tuple[str, ...]]:
+    """Return the names of each listed value of an axis."""
+    if axis not in spec.axes or axis in spec.drawn:
+        return []
+    return [names_of(spec.axes[axis], level) for level in levels_of(spec.axes[axis])]
+
+
 def _left_out(spec: ExperimentSpec, figure: FigureSpec) -> Iterator[Problem]:
     """Yield the first axis of a grid that a figure over axes does not show."""
-    shown = {*figure.axes.values(), *figure.only, *spec.repeats}
+    shown = {*figure.axes.values(), *figure.only, *spec.repeats, *spec.drawn}
     if figure.limit in spec.limits:
         shown.add(spec.limits[figure.limit].of)
     left = [name for name in (*spec.axes, *([RUN] if spec.runs else [])) if name not in shown]
-    if figure.what.over_axes and spec.design == "grid" and left:
+    if figure.what.over_axes and (spec.design == "grid" or spec.sampled) and left:
         sentence = f"the axis {left[0]!r} is not used in this figure: assign it to lines or panels"
         yield Problem((), sentence, "figure-invalid")

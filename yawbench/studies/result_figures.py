@@ -97,7 +97,7 @@ def draw_over_axes(findings: ExperimentResult, spec: FigureSpec) -> Figure:
             drawing.fill(axes, runs)
             axes.set_title(literal(heading))
             if k + columns >= len(drawn):  # the lowest panel of its column
-                axes.set_xlabel(literal(drawing.label(spec.x)) if spec.x else "")
+                axes.set_xlabel(literal(drawing.label(spec.x) if spec.x else drawing.across))
                 axes.tick_params(labelbottom=True)
             if k % columns == 0:
                 axes.set_ylabel(literal("\n".join(textwrap.wrap(drawing.upwards, 34))))

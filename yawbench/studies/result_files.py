@@ -25,6 +25,7 @@ from .experiment_result import ExperimentResult
 from .limits import limits_of
 from .result_tables import heading, measured_words, verdict
 from .tables import Table, column, to_csv
+from .uncertainty import sample_columns
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -99,7 +100,7 @@ def verdict_columns(findings: ExperimentResult) -> Table:
 
 
 def write_table(findings: ExperimentResult, out: Path) -> None:
-    """Write table and verdicts as CSV, and the table as Parquet with units in the fields' metadata.
+    """Write table, verdicts and what a sample tells as CSV, and the table as Parquet with units in it.
 
     Raises:
         ResultsError: a file cannot be written.
@@ -108,6 +109,7 @@ def write_table(findings: ExperimentResult, out: Path) -> None:
     contents: dict[str, str | bytes] = {TABLE[0]: to_csv(table), TABLE[1]: _parquet(findings, table)}
     if findings.spec.claims or findings.spec.checks:
         contents[VERDICTS] = to_csv(verdict_columns(findings))
+    contents |= {f"{name}.csv": to_csv(columns) for name, columns in sample_columns(findings).items()}
     for name, content in contents.items():
         try:
             write_whole(out / name, content)

@@ -24,6 +24,7 @@ from .limits import limit_table
 from .schema import TableSpec
 from .sections import sections
 from .tables import Cell, Column, Table, marked, remarks
+from .uncertainty import sample_tables
 
 CARRIES = ("margin", "region", "nearest flip")
 """Headings about the robustness of a verdict; the last two need a region."""
@@ -37,6 +38,7 @@ def all_tables(findings: ExperimentResult) -> list[Table]:
         *claim_tables(findings),
         *(sections()[name].table(one) for name, found in findings.sections.items() for one in found),
         *limit_tables(findings),
+        *sample_tables(findings),
     ]
 
 

@@ -80,10 +80,10 @@ the claims suffice. Margin, share, flip and the verdicts are defined in
 With axes, a limit is how far one of them may go; curves and maps show a metric over one or two of them.
 
     title: How fast may the car enter the manoeuvre?
-    scenario: 25mps.yaml
+    scenario: 25mps.yaml                   # several, [25mps.yaml, 30mps.yaml], are an axis `scenario`
     set: {driver.amplitude: 0.05}          # for all runs; swap, stop_time, ... likewise
     design: grid                           # every combination; list: first with first, second with
-    axes:                                  #   second; latin_hypercube: needs `points`, `seed`
+    axes:                                  #   second; samples: see below
       friction: {vary: inputs.friction*, from: 0.1, to: 1.0, count: 10}
       speed: {vary: plant.initial_speed, from: 36, to: 144, count: 10, unit: km/h, says: Entry speed}
       control: {vary: controller, values: {controller_off: no control, controller_fnn: neural network}}
@@ -107,6 +107,28 @@ take values, as do `stop_time`, `step_size` and `algorithm`; an instance alone t
       variants:
         no control: {swap: {controller: controller_off}}
         with slip control: {swap: {wheel_control: wheel_control_slip}, set: {driver.amplitude: 0.04}}
+
+A sample draws from axes without listed values: from a range, a normal distribution, which `from` and `to`
+truncate, or a table. Every combination of the other axes, laws and scenarios say, has the same points.
+`design` is latin_hypercube, sobol, random (independent points) or saltelli (for Sobol indices, with `points`
+times the drawn axes and two runs for each combination). Results are means, deviations, percentiles,
+probabilities, differences from the first law at the same points, and sensitivities.
+
+    design: sobol
+    points: 256                            # a power of two for sobol and saltelli
+    seed: 1
+    axes:
+      friction: {vary: inputs.friction*, from: 0.3, to: 1.0}      # uniform; with spacing: log its logarithm
+      mass: {vary: vehicle.mass, normal: {mean: 1500, deviation: 80}, from: 1300, to: 1750}
+      speed: {vary: plant.initial_speed, table: [[60, 0], [80, 0.7], [120, 1]], unit: km/h}
+      noise: {vary: sensor.seed, from: 1, to: 1000000, whole: true}
+      control: {vary: controller, values: {controller_off: no control, controller_fnn: neural network}}
+    probabilities:
+      held: {says: The car is held, holds_if: [{metric: sideslip, at_most: 10 deg}]}
+    figures:
+      - {name: sideslip, kind: distribution, metric: sideslip, lines: control}
+      - {name: gain, kind: distribution, metric: sideslip, lines: control, against: no control}
+      - {name: causes, kind: sensitivity, metric: sideslip, lines: control}
 
 An axis of seeds with `repeats` gives every number as the mean over it, with a confidence interval
 (`confidence.interval`); a verdict whose bound lies inside is undecided. `runs` names the runs it applies to.
@@ -136,7 +158,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, ConfigDict, Field, model_validator
+from pydantic import BeforeValidator, ConfigDict, Field, WithJsonSchema, model_validator
 
 from yawbench.figures.plots import OVERVIEW
 from yawbench.foundation.messages import listed
@@ -144,7 +166,8 @@ from yawbench.orchestrator.scenario.schema import Scalar
 from yawbench.orchestrator.scenario.schema_validation import OneOf, StrictModel, exactly_one
 from yawbench.orchestrator.scenario.yaml_lines import KeyPath
 
-from .axes import MOST, AxisSpec, DesignAxisSpec, OverrideSpec, RegionSpec
+from .axes import MOST, SCENARIO, AxisSpec, DesignAxisSpec, OverrideSpec, RegionSpec
+from .claim_schema import LEVELS as VALUES
 from .claim_schema import (
     Alternatives,
     Assertion,
@@ -161,6 +184,7 @@ from .claim_schema import (
     QuantityText,
     alternatives,
 )
+from .sampling import SAMPLES, runs_of_design
 
 
 class ChoiceSpec(OverrideSpec):
@@ -248,6 +272,7 @@ class FigureKind:
     shows: Literal["runs", "metric", "limit", "grid"]  # the key that it needs
     drawing: str = ""  # "module:class" in this package, an `axis_figures.Drawing`; "": runs are overlaid
     upwards: bool = False  # whether a second axis points upwards (y), in place of lines
+    of_sample: bool = False  # whether it is about all points drawn, and so has no x
 
     @property
     def over_axes(self) -> bool:
@@ -258,12 +283,17 @@ class FigureKind:
     def needs(self) -> tuple[str, ...]:
         """The keys that such a figure must have."""
         of_runs = ("panels",) if self.shows == "runs" else ()
-        return (self.shows, *of_runs, *("x",) * self.over_axes, *("y",) * self.upwards)
+        return (
+            self.shows, *of_runs, *("x",) * (self.over_axes and not self.of_sample), *("y",) * self.upwards
+        )  # fmt: skip
 
     @property
     def takes(self) -> tuple[str, ...]:
         """The keys that such a figure may have besides."""
-        of_axes = ("only", "panels", *("lines",) * (not self.upwards)) if self.over_axes else ()
+        of_axes: tuple[str, ...] = ()
+        if self.over_axes:
+            of_axes = ("only", "panels", *("lines",) * (not self.upwards))
+        of_axes += ("against",) * self.of_sample
         of_scale = () if self.shows == "runs" else ("scale", "largest", *("mark",) * (self.shows != "limit"))
         return (*of_axes, *of_scale)
 
@@ -274,6 +304,8 @@ FIGURE_KINDS = {
     "map": FigureKind("metric", "axis_figures:MapDrawing", upwards=True),
     "limit": FigureKind("limit", "axis_figures:LimitDrawing"),
     "grid": FigureKind("grid", "axis_figures:GridDrawing"),
+    "distribution": FigureKind("metric", "sample_figures:DistributionDrawing", of_sample=True),
+    "sensitivity": FigureKind("metric", "sample_figures:SensitivityDrawing", of_sample=True),
 }
 """Name -> kind of figure."""
 ShownAxis = Annotated[str, NameOf("axis or run")]
@@ -309,6 +341,9 @@ class FigureSpec(StrictModel):
     x: ShownAxis = Field("", description="Horizontal axis")
     y: ShownAxis = Field("", description="Vertical axis, of a map")
     lines: ShownAxis = Field("", description="Axis with a line per value, of curves and limits")
+    against: str = Field(
+        "", description="Of a distribution: value of `lines`, whose number at the same point is subtracted"
+    )
     only: Annotated[dict[str, Chosen], NameOf("axis")] = Field(
         {}, description="Axis -> that of its values, or those, which are drawn"
     )
@@ -356,12 +391,16 @@ class ExperimentSpec(OverrideSpec):
     source: str = Field(
         "", description="The paper, with all that is needed to find it, or whose question it is"
     )
-    scenario: str = Field("", description="Scenario of the only run, relative to this file")
+    scenario: Annotated[str, WithJsonSchema({"anyOf": [{"type": "string"}, *VALUES["anyOf"]]})] = Field(
+        "", description="Scenario of the only run, relative to this file; several are an axis `scenario`"
+    )
     runs: list[RunSpec] = Field([], description="In place of a scenario")
     axes: dict[str, DesignAxisSpec] = Field({}, description="Name -> what varies")
-    design: Literal["grid", "list", "latin_hypercube"] = Field("grid", description="Which points of the axes")
-    points: int | None = Field(None, ge=1, description="Of a Latin hypercube")
-    seed: int | None = Field(None, ge=0, description="Of a Latin hypercube")
+    design: Literal["grid", "list", "latin_hypercube", "sobol", "random", "saltelli"] = Field(
+        "grid", description="Which points of the axes; the last four draw a sample"
+    )
+    points: int | None = Field(None, ge=1, le=MOST, description="Of a sample: how many are drawn")
+    seed: int | None = Field(None, ge=0, description="Of a sample")
     metrics: dict[str, MetricSpec] = {}
     tables: list[TableSpec] = []
     grids: dict[str, GridSpec] = {}
@@ -370,6 +409,9 @@ class ExperimentSpec(OverrideSpec):
     checks: list[Claim] = Field([], description="Checks of this project on its results")
     region: RegionSpec | None = Field(None, description="Open values over which claims are judged again")
     limits: dict[str, LimitSpec] = {}
+    probabilities: dict[str, Assertion] = Field(
+        {}, description="Name -> conditions, of which a sample tells how probable it is that all hold"
+    )
     figures: list[FigureSpec] = []
     keep: Literal["limits", "all", "none"] = Field(
         "limits",
@@ -377,6 +419,22 @@ class ExperimentSpec(OverrideSpec):
         "within each limit, the first beyond it, and those that failed",
     )
     tuning: TuningSpec | None = Field(None, description="What `yawbench tune` tunes")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _scenarios(cls, data: Any) -> Any:
+        """Make an axis of several scenarios."""
+        several = data.get("scenario") if isinstance(data, dict) else None
+        if not isinstance(several, (dict, list)):
+            return data
+        files = alternatives(several)
+        axes = data.get("axes") or {}
+        if not isinstance(axes, dict) or SCENARIO in axes:
+            raise ValueError(f"scenario: several are an axis {SCENARIO!r}, which there is already")
+        if len({*files.values()}) < len(files) or len(files) < 2:
+            raise ValueError("scenario: names two or more, each with its own words")
+        variants = {words: {"scenario": file} for file, words in files.items()}
+        return {**data, "scenario": next(iter(files)), "axes": {SCENARIO: {"variants": variants}, **axes}}
 
     @model_validator(mode="after")
     def _consistent(self) -> ExperimentSpec:
@@ -388,11 +446,14 @@ class ExperimentSpec(OverrideSpec):
             raise ValueError("region: runs along axes have none; it is for named runs at one point")
         if self.tuning and (self.axes or self.region):
             raise ValueError("tuning has axes of its own, law by law, and no region")
-        if self.design == "latin_hypercube":
-            if self.points is None or self.seed is None:
-                raise ValueError("a latin_hypercube needs points and seed")
+        if self.sampled:
+            self._check_sample()
         elif self.points is not None or self.seed is not None:
-            raise ValueError(f"points and seed belong to a latin_hypercube; the design is {self.design}")
+            raise ValueError(
+                f"points and seed belong to {listed(SAMPLES, last='or')}; the design is {self.design}"
+            )
+        elif self.probabilities:
+            raise ValueError(f"probabilities need a design that draws: {listed(SAMPLES, last='or')}")
         else:
             self._check_lengths()
         if self.repeats and self.design != "grid":
@@ -412,6 +473,7 @@ class ExperimentSpec(OverrideSpec):
         """Yield every condition of claims, checks and limits, with its key in the file."""
         judged: list[tuple[str, str | int, Assertion]] = [*self.assertions()]
         judged += [("limits", name, limit) for name, limit in self.limits.items()]
+        judged += [("probabilities", name, one) for name, one in self.probabilities.items()]
         for group, which, assertion in judged:
             for k, condition in enumerate(assertion.holds_if):
                 yield (group, which, "holds_if", k), condition
@@ -421,18 +483,41 @@ class ExperimentSpec(OverrideSpec):
         """The axes with `repeats`."""
         return [name for name, axis in self.axes.items() if axis.repeats]
 
+    @property
+    def sampled(self) -> bool:
+        """Whether the design draws points."""
+        return self.design in SAMPLES
+
+    @property
+    def drawn(self) -> list[str]:
+        """The axes that are drawn, if the design draws."""
+        return [name for name, axis in self.axes.items() if axis.drawn] if self.sampled else []
+
     def number_of_points(self) -> int:
         """Return the number of points of the design."""
-        if self.design == "latin_hypercube":
-            return self.points or 0
+        if self.sampled:
+            listed_ones = [axis.length or 0 for axis in self.axes.values() if not axis.drawn]
+            return math.prod(listed_ones) * runs_of_design(self.design, len(self.drawn), self.points or 0)
         lengths = [axis.length or 0 for axis in self.axes.values()]
         return max(lengths, default=1) if self.design == "list" else math.prod(lengths)
+
+    def _check_sample(self) -> None:
+        if self.points is None or self.seed is None:
+            raise ValueError(f"a {self.design} needs points and seed")
+        if not self.drawn:
+            raise ValueError(f"a {self.design} needs an axis to draw from: a range, normal or table")
+        if self.design in ("sobol", "saltelli") and self.points & (self.points - 1):
+            lower = 1 << (self.points.bit_length() - 1)
+            raise ValueError(
+                f"points: of a Sobol sequence are a power of two, {lower} or {2 * lower} (got {self.points})"
+            )
 
     def _check_lengths(self) -> None:
         lengths = {name: axis.length for name, axis in self.axes.items()}
         for name, length in lengths.items():
             if length is None:
-                raise ValueError(f"axes.{name}: needs count")
+                other = f", or a design that draws: {listed(SAMPLES, last='or')}"
+                raise ValueError(f"axes.{name}: needs count{other}")
         if self.design == "list" and len(set(lengths.values())) > 1:
             counted = ", ".join(f"{name} has {n}" for name, n in lengths.items())
             raise ValueError(f"axes of a list must have the same number of values ({counted})")

@@ -29,7 +29,6 @@ from .experiment_result import ExperimentResult
 from .tables import Table, column
 
 if TYPE_CHECKING:
-    import numpy as np
     from matplotlib.figure import Figure
 
     from .schema import LawSpec, TuningSpec
@@ -101,6 +100,7 @@ def search(experiment: LoadedExperiment, judged: JudgeExperiment) -> list[TunedL
     """
     import numpy as np
     from scipy.optimize import differential_evolution
+    from scipy.stats import qmc
 
     tuning = tuning_of(experiment)
     fixed = _fixed(experiment, judged)
@@ -120,7 +120,7 @@ def search(experiment: LoadedExperiment, judged: JudgeExperiment) -> list[TunedL
             return np.array([trial.cost for trial in trials[-len(values) :]])
 
         chance = np.random.default_rng(tuning.seed)
-        first = _hypercube(tuning.population, len(axes), chance.spawn(1)[0])
+        first = qmc.LatinHypercube(len(axes), rng=chance).random(tuning.population)
         first[0] = 0.5
         differential_evolution(
             costs, [(0.0, 1.0)] * len(axes), init=first, maxiter=tuning.generations - 1, rng=chance,
@@ -136,19 +136,6 @@ def best_of(experiment: LoadedExperiment, tuned_laws: Sequence[TunedLaw]) -> Loa
     return trials_of(
         experiment, {tuned.law: changes_of(laws[tuned.law], tuned.best.values) for tuned in tuned_laws}
     )
-
-
-def _hypercube(number: int, axes: int, chance: np.random.Generator) -> np.ndarray:
-    """Return points, (number, axes): each of `number` equal parts of every axis, 0 to 1, holds one of them.
-
-    `scipy.stats.qmc` draws the same, after a slow import.
-    """
-    import numpy as np
-
-    within = chance.uniform(size=(number, axes))
-    parts = np.array([chance.permutation(number) for _ in range(axes)]).T
-    places: np.ndarray = (1 + parts - within) / number
-    return places
 
 
 def _fixed(experiment: LoadedExperiment, judged: JudgeExperiment) -> MetricTable:

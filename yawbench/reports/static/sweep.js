@@ -50,8 +50,8 @@ class Sweep extends InAddress {
     const [x = '', y = '', panel = ''] = data.map;
     const state = {metric: data.metric, limit: data.limits[data.metric]?.bound ?? null, x, y, panel, fixed: {}, brush: {}, open: []};
     const cells = [x, y, panel].reduce((product, name) => product * (this.axis(name)?.words.length || 1), 1);
-    if (panel && cells > MOST_CELLS) state.fixed[panel] = 0;
-    for (const dim of this.others(state)) if (!dim.repeats) state.fixed[dim.id] = 0;
+    if (panel && cells > MOST_CELLS && data.grid) state.fixed[panel] = 0;
+    for (const dim of this.others(state)) if (!dim.repeats && !dim.drawn) state.fixed[dim.id] = 0;
     return state;
   }
 
@@ -126,8 +126,10 @@ class Sweep extends InAddress {
   command(row) {
     const {data} = this;
     const run = data.of_run[row];
+    const [program, verb, scenario, ...base] = data.base[run];
+    const other = data.axes.map((axis, k) => axis.scenarios && axis.applies[run] && axis.scenarios[data.levels[k][row]]).filter(Boolean);
     const more = data.axes.flatMap((axis, k) => (axis.options && axis.applies[run] ? axis.options[data.levels[k][row]] : []));
-    return [...data.base[run], ...more].join(' ');
+    return [program, verb, other.at(-1) ?? scenario, ...base, ...more].join(' ');
   }
 
   // ---- drawing ----
@@ -137,7 +139,8 @@ class Sweep extends InAddress {
     find('metric').append(...data.metrics.map((one) => new Option(one.unit ? `${one.label} in ${one.unit}` : one.label, one.name)));
     const axes = this.dims.filter((dim) => dim.discrete);
     for (const name of ['x', 'y', 'panel']) {
-      find(name).append(...(name === 'x' ? [] : [new Option('–', '')]), ...axes.map((dim) => new Option(dim.label, dim.id)));
+      const offered = name === 'panel' ? axes.filter((dim) => !dim.drawn) : axes;
+      find(name).append(...(name === 'x' ? [] : [new Option('–', '')]), ...offered.map((dim) => new Option(dim.label, dim.id)));
     }
   }
 
@@ -152,7 +155,7 @@ class Sweep extends InAddress {
       find('unit').textContent = metric.unit;
       find('limit').setAttribute('aria-valuetext', state.limit === null ? 'no limit' : this.text(state.limit, metric));
     }
-    const selects = [this.axis(state.panel), ...this.others(state)].filter(Boolean).map((dim) => {
+    const selects = [this.axis(state.panel), ...this.others(state)].filter((dim) => dim && !dim.drawn).map((dim) => {
       const label = made('label', `${dim.label} `);
       const select = made('select');
       select.dataset.axis = dim.id;
@@ -208,16 +211,18 @@ class Sweep extends InAddress {
     const [x, y, panel] = [state.x, state.y, state.panel].map((name) => this.axis(name));
     const cells = this.cells();
     const maps = panel ? (state.fixed[panel.id] === undefined ? panel.words.map((_, k) => k) : [state.fixed[panel.id]]) : [0];
-    const [across, up] = [x, y].map((dim) => (dim ? dim.words.length : 1));
-    const left = 12 + 6.6 * Math.max(...(y ? y.words.map((word) => word.length) : [0]), 2);
+    const scattered = !this.data.grid;
+    const [across, up] = [x, y].map((dim) => (!scattered && dim ? dim.words.length : 1));
+    const ends = (dim) => (!dim ? [] : dim.numbers ? dim.range.map((one, k) => [k, signed(digitsOf(one, 3))]) : dim.words.map((word, k) => [(k + 0.5) / dim.words.length, word]));
+    const left = 12 + 6.6 * Math.max(...(scattered ? ends(y).map(([, word]) => word.length) : y ? y.words.map((word) => word.length) : [0]), 2);
     let beside = Math.min(maps.length, 4);
-    while (beside > 1 && (wide / beside - left) / across < 28) beside -= 1;
+    while (beside > 1 && (wide / beside - left) / across < (scattered ? 160 : 28)) beside -= 1;
     const frame = wide / beside;
     const cw = (frame - left - 8) / across;
     const labels = new Map(cells.map((cell) => [cell, this.label(cell)]));
     const longest = Math.max(...[...labels.values()].map((label) => label.length), 1);
     const numbers = this.data.grid && longest * 5.7 + 2 <= cw && cells.length <= MOST_NUMBERS;
-    const ch = this.data.grid ? Math.max(numbers ? 22 : 9, Math.min(30, 300 / up)) : 300 / up;
+    const ch = !scattered ? Math.max(numbers ? 22 : 9, Math.min(30, 300 / up)) : 300;
     const top = 24;
     const high = top + up * ch + 40;
     const shapes = new Map(); // look -> path
@@ -230,7 +235,8 @@ class Sweep extends InAddress {
       const [x0, y0] = [(at % beside) * frame + left, Math.floor(at / beside) * high + top];
       let [px, py, w, h] = [x0 + cell.place[0] * cw, y0 + (up - 1 - cell.place[1]) * ch, cw - 1, ch - 1];
       if (!this.data.grid) {
-        const to = (dim, size) => (dim ? (dim.numbers ? (dim.at(cell.rows[0]) - dim.range[0]) / (dim.range[1] - dim.range[0]) : (dim.level(cell.rows[0]) + 0.5) / dim.words.length) : 0.5) * size;
+        const of = (dim, value) => { const [low, here, high] = (dim.log ? [dim.range[0], value, dim.range[1]].map((one) => Math.log(Math.abs(one))) : [dim.range[0], value, dim.range[1]]); return (here - low) / (high - low); };
+        const to = (dim, size) => (dim ? (dim.numbers ? of(dim, dim.at(cell.rows[0])) : (dim.level(cell.rows[0]) + 0.5) / dim.words.length) : 0.5) * size;
         [px, py, w, h] = [x0 + to(x, across * cw - 8), y0 + up * ch - 8 - to(y, up * ch - 8), 8, 8];
       }
       const shade = cell.value === null ? 'none' : this.shade(cell.value);
@@ -252,10 +258,13 @@ class Sweep extends InAddress {
       const every = x ? Math.ceil((6.6 * Math.max(...x.words.map((word) => word.length)) + 6) / cw) : 1;
       const named = x && this.data.grid && every <= across / 2; // else they are cut at the sides
       const below = named ? x.words.map((word, i) => (i % every ? '' : `<text class="ys-quiet" x="${(x0 + (i + 0.5) * cw).toFixed(1)}" y="${(y0 + up * ch + 13).toFixed(1)}" text-anchor="middle" font-size="11">${escaped(word)}</text>`)).join('') : '';
+      const border = scattered ? `<path class="ys-frame" d="M${x0} ${y0}v${ch}h${(cw - 0.5).toFixed(1)}"/>` : '';
+      const marks = !scattered ? '' : ends(x).map(([part, word]) => `<text class="ys-quiet" x="${(x0 + part * cw).toFixed(1)}" y="${y0 + ch + 13}" text-anchor="${part === 0 ? 'start' : part === 1 ? 'end' : 'middle'}" font-size="11">${escaped(word)}</text>`).join('')
+        + ends(y).map(([part, word]) => `<text class="ys-quiet" x="${x0 - 5}" y="${(y0 + ch - part * (ch - 10)).toFixed(1)}" text-anchor="end" font-size="11">${escaped(word)}</text>`).join('');
       const steps = Math.ceil(13 / ch);
       const aside = y && this.data.grid ? y.words.map((word, j) => (j % steps ? '' : `<text class="ys-quiet" x="${(x0 - 5).toFixed(1)}" y="${(y0 + (up - 0.5 - j) * ch + 4).toFixed(1)}" text-anchor="end" font-size="11">${escaped(word)}</text>`)).join('') : '';
-      return `<text x="${x0}" y="${y0 - 8}" font-weight="600">${escaped(title)}${y ? `<tspan class="ys-quiet" font-weight="400">${title ? '; ' : ''}up: ${escaped(label(y))}</tspan>` : ''}</text>${below}${aside}`
-        + (x ? `<text class="ys-quiet" x="${x0}" y="${y0 + up * ch + 29}">right: ${escaped(label(x))}${named || !this.data.grid ? '' : `, ${across} values`}</text>` : '');
+      return `<text x="${x0}" y="${y0 - 8}" font-weight="600">${escaped(title)}${y ? `<tspan class="ys-quiet" font-weight="400">${title ? '; ' : ''}up: ${escaped(label(y))}</tspan>` : ''}</text>${border}${marks}${below}${aside}`
+        + (x ? `<text class="ys-quiet" x="${x0}" y="${y0 + up * ch + 29}">right: ${escaped(label(x))}${named || scattered ? '' : `, ${across} values`}</text>` : '');
     });
     const total = Math.ceil(maps.length / beside) * high;
     holder.innerHTML = `<svg viewBox="0 0 ${wide} ${total + 36}" aria-hidden="true">${paths.join('')}${heads.join('')}${texts.join('')}`
@@ -399,10 +408,10 @@ class Sweep extends InAddress {
     for (const name of ['x', 'y', 'panel']) {
       change(name, (value) => {
         const state = this.state;
-        for (const other of ['x', 'y', 'panel']) if (other !== name && state[other] === value) state[other] = state[name];
+        for (const other of ['x', 'y', 'panel']) if (other !== name && state[other] === value) state[other] = other === 'panel' && this.axis(state[name])?.drawn ? '' : state[name];
         state[name] = value;
         state.fixed = {};
-        for (const dim of this.others(state)) if (!dim.repeats) state.fixed[dim.id] = 0;
+        for (const dim of this.others(state)) if (!dim.repeats && !dim.drawn) state.fixed[dim.id] = 0;
         this.refresh();
       });
     }

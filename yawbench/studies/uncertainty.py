@@ -1,0 +1,521 @@
+"""Results of a sample: what runs come to whose conditions are drawn, with how sure each number is.
+
+A group has all points drawn, for one combination of the listed values; every group has the same points. Its
+numbers are those of runs that have one; the others are counted, and never count as within a limit.
+
+| number | interval, 95 % | holds the truth |
+|---|---|---|
+| mean, difference of means | Student (`confidence.interval`) | 95 % of normal numbers, else about |
+| standard deviation | jackknife (`confidence.jackknife`) | 80 to 97 % |
+| percentile | order statistics, by the binomial distribution | at least 95 % |
+| probability | Clopper and Pearson (`confidence.share_bounds`) | at least 95 % |
+| distribution function | Dvoretzky, Kiefer, Wolfowitz: ± sqrt(ln 40 / 2n) | at least 95 %, all of it |
+| rank correlation | Fisher's z, variance of Bonett and Wright | about 95 % |
+| Sobol index | linearized (delta method), Student | about 95 %, of many points |
+
+All hold for independent points. Those of a Latin hypercube and of a Sobol sequence lie more evenly, so the
+numbers are better than their intervals say, the most for what is a sum of effects of single quantities.
+
+Sobol indices are shares of the variance that a quantity explains alone (first), and with all others (total):
+
+    S_i = mean of f_B (f_ABi - f_A) / V        S_Ti = mean of (f_A - f_ABi)² / 2 V        V: variance of A, B
+
+for numbers f around their mean, at points A, B, and A with the values of B on axis i.
+
+Sources: H. A. David, H. N. Nagaraja, Order Statistics, 3rd ed., Wiley (2003), section 7.1. P. Massart, The
+tight constant in the Dvoretzky-Kiefer-Wolfowitz inequality, Annals of Probability 18 (1990) 1269-1283. D. G.
+Bonett, T. A. Wright, Sample size requirements for estimating Pearson, Kendall and Spearman correlations,
+Psychometrika 65 (2000) 23-28. A. Saltelli, P. Annoni, I. Azzini, F. Campolongo, M. Ratto, S. Tarantola,
+Variance based sensitivity analysis of model output, Computer Physics Communications 181 (2010) 259-270,
+table 2 (b) and (f). A. B. Owen, Monte Carlo variance of scrambled net quadrature, SIAM J. Numerical Analysis
+34 (1997) 1884-1910: a Latin hypercube of n points is never worse than n - 1 random ones.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple, TypeVar
+
+import numpy as np
+
+from yawbench.metrics.expressions import MetricValue, metric
+from yawbench.metrics.measures import si
+
+from .axes import RUN, Level
+from .claim_schema import Assertion
+from .claims import judge
+from .confidence import TAIL, ConfidenceInterval, interval, jackknife, share_bounds
+from .experiment import Case, NamedRun
+from .experiment_result import ExperimentResult
+from .sampling import runs_of_design
+from .tables import Cell, Column, Table, column
+
+PERCENTILES = (1, 5, 10, 25, 50, 75, 90, 95, 99)
+"""Percentiles in files; chosen: quartiles, and the tails that are usually asked for."""
+SHOWN = (5, 50, 95)
+"""Percentiles in tables for people."""
+MOST_EXACT = 2000
+"""Numbers up to which the interval of a deviation leaves out each in turn; of more, it is linearized."""
+
+
+Drawn = TypeVar("Drawn", np.ndarray, Sequence[Case])
+"""What there is one of for each point."""
+
+
+class Estimate(NamedTuple):
+    """A number with the bounds of its interval; None: there is no bound."""
+
+    number: float
+    low: float | None
+    high: float | None
+
+    @classmethod
+    def of(cls, mean: ConfidenceInterval) -> Estimate:
+        """Return a mean with its interval."""
+        return cls(mean.mean, mean.mean - mean.half, mean.mean + mean.half)
+
+
+@dataclass(frozen=True)
+class Group:
+    """Runs that differ only in what is drawn."""
+
+    run: NamedRun
+    levels: tuple[tuple[str, Level], ...]  # of the listed axes
+    cases: Sequence[Case]  # in the order in which their points are drawn
+
+    @property
+    def words(self) -> list[str]:
+        """Its run, if named, and its listed values in words."""
+        return [*([self.run.row] if self.run.name else []), *(level.words for _, level in self.levels)]
+
+
+def groups_of(findings: ExperimentResult) -> list[Group]:
+    """Return the groups of a sample, in the order of the design; none if nothing was drawn."""
+    experiment, spec = findings.experiment, findings.spec
+    if not spec.drawn or experiment.design:
+        return []
+    number = runs_of_design(spec.design, len(spec.drawn), spec.points or 0)
+    groups = []
+    for first in range(0, len(experiment.cases), number):
+        cases = experiment.cases[first : first + number]
+        pairs = zip(spec.axes, cases[0].point, strict=True)
+        levels = tuple((name, level) for name, level in pairs if name not in spec.drawn)
+        groups.append(Group(cases[0].run, levels, cases))
+    return groups
+
+
+def numbers_of(findings: ExperimentResult, group: Group, key: str) -> np.ndarray:
+    """Return a metric of a group's runs in SI, shape (points,); NaN where a run has none."""
+    values = (findings.value(case, key) for case in group.cases)
+    return np.array([value.number if value else math.nan for value in values])
+
+
+def independent(findings: ExperimentResult, drawn: Drawn) -> Drawn:
+    """Return those of a group's points that do not repeat values of others."""
+    points = findings.spec.points or 0
+    return drawn[: 2 * points] if findings.spec.design == "saltelli" else drawn
+
+
+def mean(numbers: np.ndarray) -> Estimate | None:
+    """Return the mean of finite numbers with its interval; None without numbers."""
+    over = interval(numbers.tolist())
+    return Estimate.of(over) if over and math.isfinite(over.mean) else None
+
+
+def deviation(numbers: np.ndarray) -> Estimate | None:
+    """Return the standard deviation of finite numbers with its interval; None of fewer than three."""
+    n = len(numbers)
+    if n < 3:
+        return None
+    found = float(np.std(numbers, ddof=1))
+    if n <= MOST_EXACT:
+        half = float(jackknife(lambda of: np.array([np.std(numbers[of], ddof=1)]), n)[1][0])
+    else:
+        squares = (numbers - numbers.mean()) ** 2
+        over = interval((squares / (2.0 * found)).tolist()) if found else None
+        half = over.half if over else 0.0
+    return Estimate(found, max(0.0, found - half), found + half)
+
+
+def percentile(numbers: np.ndarray, per_cent: float) -> Estimate:
+    """Return a percentile of finite numbers, with the order statistics between which it lies."""
+    from scipy.stats import binom
+
+    ordered, n, share = np.sort(numbers), len(numbers), per_cent / 100
+    below, above = int(binom.ppf(TAIL, n, share)), int(binom.ppf(1.0 - TAIL, n, share)) + 1
+    low = float(ordered[below - 1]) if below >= 1 else None
+    return Estimate(
+        float(np.quantile(ordered, share)), low, float(ordered[above - 1]) if above <= n else None
+    )
+
+
+def probability(count: int, number: int) -> Estimate:
+    """Return a share with its interval by Clopper and Pearson."""
+    return Estimate(count / number, *share_bounds(count, number))
+
+
+def band(number: int) -> float:
+    """Return half the height of the band that holds a whole distribution function."""
+    return math.sqrt(math.log(2.0 / (2.0 * TAIL)) / (2.0 * number))
+
+
+def rank_correlation(x: np.ndarray, y: np.ndarray) -> Estimate | None:
+    """Return Spearman's rank correlation of finite numbers with its interval; None if one does not vary."""
+    from scipy.special import ndtri
+    from scipy.stats import rankdata
+
+    if len(x) < 4 or np.ptp(x) == 0.0 or np.ptp(y) == 0.0:
+        return None
+    found = float(np.clip(np.corrcoef(rankdata(x), rankdata(y))[0, 1], -1.0, 1.0))
+    if abs(found) == 1.0:
+        return Estimate(found, found, found)
+    half = -float(ndtri(TAIL)) * math.sqrt((1.0 + found**2 / 2.0) / (len(x) - 3))
+    return Estimate(found, math.tanh(math.atanh(found) - half), math.tanh(math.atanh(found) + half))
+
+
+class SobolIndices(NamedTuple):
+    """The share of the variance that a quantity explains alone, and together with all others."""
+
+    first: Estimate
+    total: Estimate
+
+
+def sobol_indices(a: np.ndarray, b: np.ndarray, mixed: np.ndarray) -> SobolIndices | None:
+    """Return the Sobol indices of a quantity.
+
+    Args:
+        a, b, mixed: numbers at the points A, B, and A with the values of B for the quantity, shape (points,);
+            NaN where a run has none.
+
+    None if the numbers do not vary, or fewer than three points have all of them.
+    """
+    known = np.isfinite(a) & np.isfinite(b) & np.isfinite(mixed)
+    a, b, mixed = a[known], b[known], mixed[known]
+    if len(a) < 3:
+        return None
+    centre = (a.mean() + b.mean()) / 2
+    a, b, mixed = a - centre, b - centre, mixed - centre
+    squares = (a**2 + b**2) / 2
+    variance = float(squares.mean())
+    if variance == 0.0:
+        return None
+
+    def index(terms: np.ndarray) -> Estimate:
+        found = float(terms.mean()) / variance
+        over = interval(((terms - found * squares) / variance).tolist())
+        half = over.half if over else 0.0
+        return Estimate(found, found - half, found + half)
+
+    return SobolIndices(index(b * (mixed - a)), index((a - mixed) ** 2 / 2))
+
+
+# ---- tables ----
+
+
+def sample_tables(findings: ExperimentResult) -> list[Table]:
+    """Return the tables of a sample for people: statistics, probabilities, differences, sensitivities."""
+    groups = groups_of(findings)
+    if not groups:
+        return []
+    tables = [_shown_statistics(findings, groups, key) for key in findings.spec.metrics]
+    tables += [_shown_probability(findings, groups, name) for name in findings.spec.probabilities]
+    differences = differences_of(findings, groups)
+    for key in findings.spec.metrics if differences else ():
+        tables.append(_shown_differences(findings, differences, key))
+    tables += [_shown_sensitivities(findings, groups, key) for key in findings.spec.metrics]
+    return [table for table in tables if table.rows]
+
+
+def sample_columns(findings: ExperimentResult) -> dict[str, Table]:
+    """Return name -> columns of a sample for programs and files, in SI units."""
+    groups = groups_of(findings)
+    if not groups:
+        return {}
+    tables = {
+        "statistics": _statistics(findings, groups),
+        "probabilities": _probabilities(findings, groups),
+        "differences": _difference_columns(findings, differences_of(findings, groups)),
+        "sensitivity": _sensitivities(findings, groups),
+    }
+    return {name: table for name, table in tables.items() if table.rows}
+
+
+def _names(findings: ExperimentResult) -> list[str]:
+    """Return the headings that tell groups apart."""
+    spec = findings.spec
+    return [*([RUN] if spec.runs else []), *(name for name in spec.axes if name not in spec.drawn)]
+
+
+def _heading(findings: ExperimentResult, key: str) -> str:
+    spec = findings.spec.metrics[key]
+    return spec.heading or f"{metric(spec.metric).title}{spec.during()}"
+
+
+def _cell(findings: ExperimentResult, key: str, estimate: Estimate | None) -> Cell:
+    """Return an estimate of a metric with its interval."""
+    return None if estimate is None else _with_bounds(estimate, findings.unit(key))
+
+
+def _with_bounds(estimate: Estimate, unit: str) -> MetricValue:
+    number, low, high = estimate
+    if low is None or high is None:
+        return MetricValue(number, unit)
+    return MetricValue(number, unit, max(high - number, number - low), (low, high))
+
+
+def _shown_statistics(findings: ExperimentResult, groups: Sequence[Group], key: str) -> Table:
+    headings = ["runs", "mean", "standard deviation", *(f"{p} %" for p in SHOWN)]
+    table = Table(f"{_heading(findings, key)}, over what is drawn", [*_names(findings), *headings])
+    for group in groups:
+        every = independent(findings, numbers_of(findings, group, key))
+        numbers = every[np.isfinite(every)]
+        if not len(numbers):
+            continue
+        estimates = [mean(numbers), deviation(numbers), *(percentile(numbers, p) for p in SHOWN)]
+        count = f"{len(numbers)}" if len(numbers) == len(every) else f"{len(numbers)} of {len(every)}"
+        cells = [_cell(findings, key, estimate) for estimate in estimates]
+        table.rows.append([*group.words, count, *cells])
+        if len(numbers) < len(every):
+            table.notes = ["runs without a number are not in these numbers"]
+    return table
+
+
+def _columns(
+    findings: ExperimentResult,
+    rows: Sequence[tuple[Group, str]],
+    more: Iterable[tuple[Column, Sequence[Cell]]],
+) -> Table:
+    """Return columns that begin with the group and the metric of each row."""
+    names = _names(findings)
+    words = [[*group.words] for group, _ in rows]
+    first = [column(name, "string", [row[k] for row in words]) for k, name in enumerate(names)]
+    units = [si(findings.unit(key)) if key in findings.spec.metrics else "1" for _, key in rows]
+    about = [
+        column("metric", "string", [key for _, key in rows]),
+        column(
+            "unit", "string", units, {"description": "of the numbers beside it, where they are no shares"}
+        ),
+    ]
+    return Table.of_columns([*first, *about, *more])
+
+
+def _estimated(
+    heading: str, estimates: Sequence[Estimate | None], about: dict[str, str] | None = None
+) -> list[tuple[Column, Sequence[Cell]]]:
+    """Return the columns of estimates and of the bounds of their intervals."""
+    parts = [("", 0), (" low", 1), (" high", 2)]
+    return [
+        column(f"{heading}{part}", "float64", [one[k] if one else None for one in estimates], about)
+        for part, k in parts
+    ]
+
+
+def _statistics(findings: ExperimentResult, groups: Sequence[Group]) -> Table:
+    rows = [(group, key) for group in groups for key in findings.spec.metrics]
+    every = [independent(findings, numbers_of(findings, group, key)) for group, key in rows]
+    numbers = [some[np.isfinite(some)] for some in every]
+    counts = [
+        column("runs", "int64", [len(some) for some in numbers]),
+        column(
+            "missing", "int64", [len(all_) - len(some) for all_, some in zip(every, numbers, strict=True)]
+        ),
+    ]
+    percentiles = [
+        part
+        for p in PERCENTILES
+        for part in _estimated(f"p{p}", [percentile(some, p) if len(some) else None for some in numbers])
+    ]
+    return _columns(
+        findings,
+        rows,
+        [
+            *counts,
+            *_estimated("mean", [mean(some) for some in numbers]),
+            *_estimated("deviation", [deviation(some) for some in numbers]),
+            *percentiles,
+        ],
+    )
+
+
+def holding(findings: ExperimentResult, group: Group, assertion: Assertion) -> tuple[int, int, int]:
+    """Return how many of a group's runs meet all conditions, how many have none, and how many there are.
+
+    A run without a number, because it failed say, does not meet them.
+    """
+    cases = independent(findings, group.cases)
+    labels = {group.run.name: group.run.row}
+    verdicts = [
+        judge(assertion, findings.at.get(findings.experiment.setting(case.point), {}), labels)
+        for case in cases
+    ]
+    return sum(one.holds is True for one in verdicts), sum(one.holds is None for one in verdicts), len(cases)
+
+
+def _probability_rows(
+    findings: ExperimentResult, groups: Sequence[Group]
+) -> list[tuple[Group, str, int, int, Estimate]]:
+    rows = []
+    for name, assertion in findings.spec.probabilities.items():
+        for group in groups:
+            count, missing, number = holding(findings, group, assertion)
+            rows.append((group, name, count, missing, probability(count, number)))
+    return rows
+
+
+def _shown_probability(findings: ExperimentResult, groups: Sequence[Group], name: str) -> Table:
+    says = findings.spec.probabilities[name].says.rstrip(".")
+    table = Table(f"Probability: {says}", [*_names(findings), "runs", "probability"])
+    for group, of, count, missing, estimate in _probability_rows(findings, groups):
+        if of == name:
+            number = len(independent(findings, group.cases))
+            table.rows.append([*group.words, f"{count} of {number}", _with_bounds(estimate, "%")])
+            if missing:
+                table.notes = ["a run without a number counts as one that does not meet the conditions"]
+    return table
+
+
+def _probabilities(findings: ExperimentResult, groups: Sequence[Group]) -> Table:
+    rows = _probability_rows(findings, groups)
+    names = _names(findings)
+    words = [group.words for group, *_ in rows]
+    return Table.of_columns(
+        [
+            column("probability of", "string", [name for _, name, *_ in rows]),
+            *(column(name, "string", [row[k] for row in words]) for k, name in enumerate(names)),
+            column("runs", "int64", [len(independent(findings, group.cases)) for group, *_ in rows]),
+            column("meeting", "int64", [count for *_, count, _, _ in rows]),
+            column("missing", "int64", [missing for *_, missing, _ in rows]),
+            *_estimated("probability", [estimate for *_, estimate in rows], {"unit": "1"}),
+        ]
+    )
+
+
+class Difference(NamedTuple):
+    """Two groups of the same points that differ in one listed value."""
+
+    axis: str  # "run" for named runs
+    group: Group
+    baseline: Group
+    words: str  # the value
+    than: str  # the first value of the axis
+
+
+def differences_of(findings: ExperimentResult, groups: Sequence[Group]) -> list[Difference]:
+    """Return each group with that of the first value of each listed axis, all others alike."""
+    by_levels = {(group.run.name, group.levels): group for group in groups}
+    found = []
+    for name in _names(findings):
+        firsts: dict[Any, Group] = {}
+        for group in groups:
+            if name == RUN:
+                others: Any = group.levels
+                here = group.run.row
+            else:
+                others = (group.run.name, tuple(pair for pair in group.levels if pair[0] != name))
+                here = dict(group.levels)[name].words
+            first = firsts.setdefault(others, group)
+            if first is not group:
+                than = first.run.row if name == RUN else dict(first.levels)[name].words
+                found.append(Difference(name, by_levels[group.run.name, group.levels], first, here, than))
+    return found
+
+
+def subtracted(findings: ExperimentResult, one: Group, other: Group, key: str) -> np.ndarray:
+    """Return the differences of a metric at the same points, where both groups have it."""
+    every = numbers_of(findings, one, key) - numbers_of(findings, other, key)
+    drawn: np.ndarray = independent(findings, every)
+    kept: np.ndarray = drawn[np.isfinite(drawn)]
+    return kept
+
+
+def _shown_differences(findings: ExperimentResult, differences: Sequence[Difference], key: str) -> Table:
+    title = f"{_heading(findings, key)}, differences at the same points"
+    table = Table(title, [*_names(findings), "less that of", "runs", "mean", "5 %", "95 %", "smaller in"])
+    for of in differences:
+        numbers = subtracted(findings, of.group, of.baseline, key)
+        if len(numbers):
+            ends = [_cell(findings, key, percentile(numbers, p)) for p in (5, 95)]
+            smaller = _with_bounds(probability(int(np.sum(numbers < 0)), len(numbers)), "%")
+            cells = [f"{len(numbers)}", _cell(findings, key, mean(numbers)), *ends, smaller]
+            table.rows.append([*of.group.words, of.than, *cells])
+    return table
+
+
+def _difference_columns(findings: ExperimentResult, differences: Sequence[Difference]) -> Table:
+    rows = [(of, key) for of in differences for key in findings.spec.metrics]
+    numbers = [subtracted(findings, of.group, of.baseline, key) for of, key in rows]
+    some = [len(of) > 0 for of in numbers]
+    smaller = [probability(int(np.sum(of < 0)), len(of)) if len(of) else None for of in numbers]
+    percentiles = [
+        part
+        for p in SHOWN
+        for part in _estimated(
+            f"p{p}", [percentile(of, p) if is_ else None for of, is_ in zip(numbers, some, strict=True)]
+        )
+    ]
+    return _columns(
+        findings,
+        [(of.group, key) for of, key in rows],
+        [
+            column("axis", "string", [of.axis for of, _ in rows]),
+            column("less that of", "string", [of.than for of, _ in rows]),
+            column("runs", "int64", [len(of) for of in numbers]),
+            *_estimated("mean", [mean(of) for of in numbers]),
+            *_estimated("deviation", [deviation(of) for of in numbers]),
+            *percentiles,
+            *_estimated("share smaller", smaller, {"unit": "1"}),
+        ],
+    )
+
+
+def sensitivities(
+    findings: ExperimentResult, group: Group, key: str
+) -> dict[str, tuple[Estimate | None, SobolIndices | None]]:
+    """Return axis -> rank correlation and Sobol indices of a metric of a group, as far as there are any."""
+    spec, numbers = findings.spec, numbers_of(findings, group, key)
+    points, places = spec.points or 0, {name: k for k, name in enumerate(spec.axes)}
+    own = independent(findings, numbers)
+    known = np.isfinite(own)
+    found = {}
+    for k, name in enumerate(spec.drawn):
+        levels = [float(case.point[places[name]].value) for case in independent(findings, group.cases)]
+        indices = None
+        if spec.design == "saltelli":
+            a, b, *mixed = (numbers[i * points : (i + 1) * points] for i in range(len(spec.drawn) + 2))
+            indices = sobol_indices(a, b, mixed[k])
+        found[name] = (rank_correlation(np.array(levels)[known], own[known]), indices)
+    return found
+
+
+def _shown_sensitivities(findings: ExperimentResult, groups: Sequence[Group], key: str) -> Table:
+    whole = findings.spec.design == "saltelli"
+    headings = ["rank correlation", *(["Sobol index, alone", "with others"] if whole else [])]
+    table = Table(f"{_heading(findings, key)}, what it depends on", [*_names(findings), "drawn", *headings])
+    for group in groups:
+        for name, (rank, indices) in sensitivities(findings, group, key).items():
+            estimates = [rank, *((indices or (None, None)) if whole else ())]
+            cells: list[Cell] = [None if one is None else _with_bounds(one, "1") for one in estimates]
+            if any(cell is not None for cell in cells):
+                table.rows.append([*group.words, findings.spec.axes[name].says or name, *cells])
+    return table
+
+
+def _sensitivities(findings: ExperimentResult, groups: Sequence[Group]) -> Table:
+    rows = [
+        (group, key, name, *pair)
+        for group in groups
+        for key in findings.spec.metrics
+        for name, pair in sensitivities(findings, group, key).items()
+    ]
+    about = {"unit": "1"}
+    more = [
+        column("axis", "string", [name for _, _, name, *_ in rows]),
+        *_estimated("rank correlation", [rank for *_, rank, _ in rows], about),
+    ]
+    if findings.spec.design == "saltelli":
+        indices: list[SobolIndices | None] = [row[-1] for row in rows]
+        more += _estimated("first", [one and one.first for one in indices], about)
+        more += _estimated("total", [one and one.total for one in indices], about)
+    return _columns(findings, [(group, key) for group, key, *_ in rows], more)
