@@ -7,6 +7,7 @@ import os
 import sys
 import time
 import uuid
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from datetime import datetime, timezone
 from pathlib import Path
@@ -81,6 +82,7 @@ def simulate(
     watch: Watch | None = None,
     format: str = "csv",
     apart: bool = False,
+    hear: Callable[[Message], None] | None = None,
 ) -> RunInfo:
     """Run a plan and write its results (`results.csv`) and `run.json` into the folder `out`.
 
@@ -100,6 +102,7 @@ def simulate(
         apart: step the instances in a child process where that is possible (see `child_run`), unless each
             has a process of its own: even if it crashes, the run ends with an error message and the results
             so far.
+        hear: called with the messages of the instances as they arrive.
 
     Raises:
         ScenarioError: `format` is unknown.
@@ -110,7 +113,7 @@ def simulate(
     """
     recorder = recorder_of(format)(Path(out), *_columns(plan))
     apart = apart and can_be_apart() and not keeps(plan) and not isinstance(opener, Isolation)
-    run = Simulation(plan, recorder, progress, watch, apart=apart)
+    run = Simulation(plan, recorder, progress, watch, apart=apart, hear=hear)
     run.make(opener)
     return RunInfo(
         Path(out),
@@ -164,6 +167,7 @@ class Simulation:
 
     Args:
         apart: step the instances in a child process (see `child_run`).
+        hear: called with the messages of the instances as they arrive.
     """
 
     def __init__(
@@ -174,13 +178,14 @@ class Simulation:
         watch: Watch | None,
         *,
         apart: bool,
+        hear: Callable[[Message], None] | None = None,
     ) -> None:
         self.plan = plan
         self.recorder = recorder
         self._watch = watch
         if watch:
             recorder.looks.append(watch.look)
-        self.log = Log()
+        self.log = Log(hear)
         self.record = run_record(plan, status=RunStatus.RUNNING, started=datetime.now(timezone.utc))
         self.record.id, self.record.key = uuid.uuid4().hex[:12], key_of(plan)
         self._apart = apart

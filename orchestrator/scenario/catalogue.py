@@ -22,6 +22,8 @@ YAML = (".yaml", ".yml")
 ENDINGS = (*YAML, ".ssp")
 ARCHIVES = (".ssp", ".ssd")
 """Endings of an SSP archive, and of a description in one."""
+FMU = ".fmu"
+"""Ending of an FMU, which alone is a scenario, too (`fmu_alone`)."""
 LOOKED_AT = 20_000
 """Maximum number of examined entries of a folder. Chosen: a second, and more than real folders have."""
 COMMANDS = {
@@ -49,7 +51,7 @@ def folders() -> list[Path]:
 
 def kind_of(path: Path) -> str:
     """Guess the kind of a file (`schema_validation.KINDS`) from its keys, unparsed; "" if unknown."""
-    if path.suffix.lower() in ARCHIVES:
+    if path.suffix.lower() in (*ARCHIVES, FMU):
         return "a scenario"
     try:
         keys = _KEY.findall(read_bytes(path, largest=TEXT).decode("utf-8-sig"))
@@ -126,7 +128,7 @@ def find(source: str | Path, kind: str) -> Path:
         return path
     known = [name.removeprefix(f"{HOMES.get(kind)}/") for name in names(kind)]
     elsewhere = [name for name in known if path.stem == name.rpartition("/")[2]]
-    if (path.suffix in ENDINGS and not elsewhere) or path.suffix.lower() in ARCHIVES:
+    if (path.suffix in ENDINGS and not elsewhere) or path.suffix.lower() in (*ARCHIVES, FMU):
         return path
     if file := named(source, kind):
         return file
