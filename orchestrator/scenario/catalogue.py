@@ -113,6 +113,23 @@ def named(name: str | Path, kind: str = "") -> Path | None:
     return next((path for path in candidates if os.path.isfile(path)), None)
 
 
+def beside(file: Path, name: str, kind: str) -> Path:
+    """Return the file that another one names: by a relative path, else by its name in a folder of scenarios.
+
+    If there is none, what the path would be.
+    """
+    path = Path(os.path.normpath(file.parent / name))
+    if Path(name).suffix in ENDINGS or os.path.exists(path):
+        return path
+    candidates = (
+        folder / home / f"{name}{ending}"
+        for folder in folders()
+        for home in dict.fromkeys((HOMES.get(kind, ""), ""))
+        for ending in ENDINGS
+    )
+    return next((found.absolute() for found in candidates if os.path.isfile(found)), path)
+
+
 def find(source: str | Path, kind: str) -> Path:
     """Find a file by its path, or by its name in a folder of scenarios.
 

@@ -14,7 +14,7 @@ from yawbench.foundation.safe_files import reads
 
 from ..plan import Override
 from . import overrides, quantities, schema_validation, yaml_lines
-from .catalogue import ARCHIVES, FMU
+from .catalogue import ARCHIVES, FMU, beside
 from .schema import Connection, LoadedScenario, PropertyFile, ScenarioSpec, Vehicle, endpoint
 from .yaml_lines import Document, KeyPath
 
@@ -101,7 +101,9 @@ def _read_vehicle(document: Document, read: Callable[..., Document]) -> Document
     name = document.data.get("vehicle") if isinstance(document.data, dict) else None
     if not isinstance(name, str):
         return Document(document.path, data={})
-    vehicle = Path(os.path.normpath(document.path.parent / name))
+    vehicle = beside(document.path, name, "a vehicle file")
+    if vehicle != Path(os.path.normpath(document.path.parent / name)):  # as a path from here on
+        document.data = yaml_lines.put(document.data, ("vehicle",), str(vehicle))
     if not os.path.exists(vehicle):
         (missing,) = read(vehicle, what="vehicle file").errors
         document.report(("vehicle",), str(missing), missing.code)

@@ -32,12 +32,34 @@ def named(kind: str, **settings: Any) -> Any:
             return [catalogue.find(name, kind) for name in value]
         return value and catalogue.find(value, kind)
 
+    return typer.Argument(callback=find, autocompletion=completing(kind), **settings)
+
+
+def completing(kind: str) -> Callable[[str], list[str]]:
+    """Return what completes the names of a kind of file."""
+
     def complete(incomplete: str) -> list[str]:
         from yawbench.orchestrator.scenario import catalogue
 
-        return [name for name in catalogue.names(kind) if name.startswith(incomplete)]
+        home = f"{catalogue.HOMES.get(kind, '')}/"
+        names = [name.removeprefix(home) for name in catalogue.names(kind)]
+        return [name for name in names if name.startswith(incomplete)]
 
-    return typer.Argument(callback=find, autocompletion=complete, **settings)
+    return complete
+
+
+def _of_vehicle(name: str | None) -> tuple[Override, ...]:
+    """Return the override of the vehicle file.
+
+    Raises:
+        ScenarioError: the file does not exist.
+    """
+    from yawbench.orchestrator.plan import Override
+    from yawbench.orchestrator.scenario import catalogue
+
+    if name is None:
+        return ()
+    return (Override.of("vehicle", str(catalogue.find(name, "a vehicle file").resolve()), "--vehicle"),)
 
 
 ScenarioFile = Annotated[
@@ -58,6 +80,15 @@ class RunOptions:
         ScenarioError: two options contradict each other, or one is malformed.
     """
 
+    vehicle: Annotated[
+        str | None,
+        typer.Option(
+            "--vehicle",
+            metavar="FILE",
+            help="Vehicle file in place of the scenario's, or a name that `yawbench list vehicles` gives.",
+            autocompletion=completing("a vehicle file"),
+        ),
+    ] = None
     swap: Annotated[
         list[str] | None,
         typer.Option(
@@ -194,12 +225,13 @@ class RunOptions:
         """The overrides for all runs."""
         from yawbench.orchestrator.scenario.overrides import read_changes
 
-        return read_changes(self.swap or (), self.set_ or (), self.fault or ())
+        return (*_of_vehicle(self.vehicle), *read_changes(self.swap or (), self.set_ or (), self.fault or ()))
 
     @property
     def changing(self) -> dict[str, Any]:
         """The options that change all runs, as they were given."""
-        return {"swap": self.swap, "set": self.set_, "fault": self.fault}
+        vehicle = None if self.vehicle is None else [self.vehicle]
+        return {"vehicle": vehicle, "swap": self.swap, "set": self.set_, "fault": self.fault}
 
     @functools.cached_property
     def limit(self) -> float | None:
@@ -248,7 +280,7 @@ def takes(*names: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
     return taking
 
 
-CHANGES = ("swap", "set_", "fault")
+CHANGES = ("vehicle", "swap", "set_", "fault")
 """Options of commands that change a scenario."""
 MAKING = ("out", "fmus", "no_build", "isolate", "call_limit")
 """Options of commands that make runs."""
