@@ -135,13 +135,14 @@ def test_the_shell_completes_names(tmp_path, words, completed):
     assert done.stdout.split() == completed, done.stderr
 
 
-def test_files_name_others_by_names_as_commands_do_and_every_command_takes_another_car(yawbench, tmp_path):
+def test_files_name_others_by_names_and_every_command_takes_another_car(yawbench, tmp_path):
     os.chdir(tmp_path)
     text = (SCENARIOS / "fnn_sideslip/25mps.yaml").read_text()
     vehicle = next(line for line in text.splitlines() if line.startswith("vehicle:"))
     Path("mine.yaml").write_text(text.replace(vehicle, "vehicle: suv"))
     Path("study.yaml").write_text(
-        "title: One\nruns: [{name: a, scenario: fnn_sideslip/25mps}]\nmetrics: {m: {metric: peak(sideslip)}}\n"
+        "title: One\nruns: [{name: a, scenario: fnn_sideslip/25mps}]\n"
+        "metrics: {m: {metric: peak(sideslip)}}\n"
     )
     mine, inertia = yb.load("mine.yaml"), {}
     for car in ("suv", "van"):
@@ -152,7 +153,7 @@ def test_files_name_others_by_names_as_commands_do_and_every_command_takes_anoth
     assert inertia["suv"] in yawbench("check", "mine.yaml")[1]
     assert yawbench("study", "study.yaml", "--set", "stop_time=0.1", "--vehicle", "van", "--out", "s")[0] == 0
     recorded = json.loads(Path("s/a/run.json").read_text())
-    assert f"{recorded['units']['plant']['parameters']['yaw_inertia']:g} kg.m2" == inertia["van"]
+    assert f"{recorded['fmus']['plant']['parameters']['yaw_inertia']:g} kg.m2" == inertia["van"]
     Path("mine.yaml").write_text(text.replace(vehicle, "vehicle: no_such_car"))
     status, _, told = yawbench("check", "mine.yaml")
     assert (status, mentions(told, "mine.yaml:", "no_such_car")) == (2, True)

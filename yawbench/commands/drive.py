@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from yawbench.commands.judged import judging
 from yawbench.commands.options import CHANGES, MAKING, RunOptions, executor_of, takes
 from yawbench.commands.output import hold, say, stoppable, tabular
 from yawbench.foundation.errors import ResultsError, ScenarioError
@@ -52,6 +53,7 @@ DriveFigures = Annotated[bool, typer.Option("--figures", help="Also draw every r
 
 
 @tabular
+@judging
 @takes(*CHANGES, *MAKING, "jobs", "fresh")
 def drive(
     context: typer.Context,
