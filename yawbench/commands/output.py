@@ -102,7 +102,7 @@ def printing(arguments: Sequence[str]) -> Iterator[Output]:
     """Collect the output of a command line in the form that it asks for; help is text."""
     own = [*arguments[: arguments.index("--")]] if "--" in arguments else [*arguments]
     wanted: Form = "json" if "--json" in own else "latex" if "--latex" in own else "text"
-    if wanted == "text" or "--help" in own:
+    if wanted == "text" or {"-h", "--help"} & {*own}:
         yield Output()
         return
     output = Output(wanted, own[0])
