@@ -6,6 +6,8 @@ import json
 import re
 import subprocess
 import sys
+import threading
+import time
 from pathlib import Path
 from typing import Any
 
@@ -247,3 +249,15 @@ def test_a_limit_whose_runs_are_missing_is_unknown(answers, tmp_path):
     assert made["tables"][-1]["rows"] == [["20.0", "unknown (30.0 not made)"]]
     (limit,) = made["experiments"][0]["record"]["limits"]["top"]
     assert (limit["up_to"], limit["not_at"], limit["why"]) == (20.0, None, "not made")
+
+
+def test_a_command_that_takes_long_to_open_fmus_says_so(monkeypatch, capsys):
+    monkeypatch.setattr(output, "PATIENCE", 0.01)
+    with output.announced("building"):
+        time.sleep(0.1)
+    assert capsys.readouterr().err == "building\n"
+    monkeypatch.setattr(output, "PATIENCE", 60.0)
+    with output.announced("building"):
+        pass
+    assert capsys.readouterr().err == ""
+    assert threading.active_count() == 1

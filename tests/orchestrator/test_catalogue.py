@@ -121,6 +121,13 @@ KINDS = ("a scenario", "a study file", "a sweep file", "a tuning file", "a vehic
         ("sweep fnn", ["fnn_sideslip/sweep", "fnn_sideslip/sweep_slip_control"]),
         pytest.param("study fnn", ["fnn_sideslip/laws", "fnn_sideslip/study"], marks=pytest.mark.exhaustive),
         ("second", ["second-opinion"]),
+        ("run x --vehicle la", ["large_saloon"]),
+        (
+            "run x --set vehicle.unsprung_mass_",
+            ["vehicle.unsprung_mass_front=", "vehicle.unsprung_mass_rear="],
+        ),
+        ("run x --metric rms_", ["rms_error("]),
+        ("plot x --panel yaw_ra", ["yaw_rate", "yaw_rate_ref"]),
     ],
 )
 def test_the_shell_completes_names(tmp_path, words, completed):

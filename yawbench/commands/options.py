@@ -48,6 +48,28 @@ def completing(kind: str) -> Callable[[str], list[str]]:
     return complete
 
 
+def completing_names(*of: str) -> Callable[[str], list[str]]:
+    """Return what completes names of the vocabulary: `facts`, `quantities`, `signals` or `metrics`."""
+
+    def complete(incomplete: str) -> list[str]:
+        from yawbench.orchestrator.signal_names import OF_RUN, VEHICLE
+        from yawbench.vocabulary.facts import FACTS
+        from yawbench.vocabulary.signals import SIGNALS
+        from yawbench.vocabulary.vehicle import CAR
+
+        names: list[str] = []
+        names += [f"{name}=" for name in (*FACTS, *OF_RUN)] if "facts" in of else []
+        names += [f"{VEHICLE}.{name}=" for name in CAR] if "quantities" in of else []
+        names += [*SIGNALS, "path"] if "signals" in of else []
+        if "metrics" in of:
+            from yawbench.metrics.measures import catalogue as measures
+
+            names += ["standard", *(f"{measure.name}(" for measure in measures())]
+        return [name for name in names if name.startswith(incomplete)]
+
+    return complete
+
+
 def _of_vehicle(name: str | None) -> tuple[Override, ...]:
     """Return the override of the vehicle file.
 
@@ -102,6 +124,7 @@ class RunOptions:
         typer.Option(
             "--set",
             metavar="INSTANCE.PARAMETER=VALUE",
+            autocompletion=completing_names("facts", "quantities"),
             help="Set a parameter of an instance; also vehicle.NAME, inputs.NAME, INSTANCE.step_size, "
             "INSTANCE.validate, start_time, stop_time, step_size, algorithm. Repeatable.",
         ),
@@ -294,9 +317,12 @@ def plan_of_scenario(scenario: Path, options: RunOptions) -> Plan:
     """
     from yawbench.planner import Planner
 
+    from .output import BUILDING, announced
+
     planner = Planner(build=options.build)
     loaded = planner.load(scenario, options.changes, validate=not options.no_validate)
-    return planner.plan(loaded, fmus=options.fmus, isolated=options.isolate)
+    with announced(BUILDING):
+        return planner.plan(loaded, fmus=options.fmus, isolated=options.isolate)
 
 
 def pooled(context: typer.Context, options: RunOptions) -> Each:

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 import typer
 
 from yawbench.commands.animate import write_view
-from yawbench.commands.options import CHANGES, MAKING, RunOptions, takes
+from yawbench.commands.options import CHANGES, MAKING, RunOptions, completing_names, takes
 from yawbench.commands.output import say
 from yawbench.commands.recorded_runs import (
     Labels,
@@ -32,6 +32,7 @@ Panels = Annotated[
     typer.Option(
         "--panel",
         metavar="NAME",
+        autocompletion=completing_names("signals"),
         help="A signal (yaw_rate, plant.roll_angle, wheel_torque_*), its error (sideslip_error), one over "
         "another (yaw_rate(sideslip)) or path; repeatable. Default: the figures of the papers.",
     ),

@@ -14,7 +14,7 @@ from yawbench.commands import output
 from yawbench.foundation.errors import Diagnostic, ScenarioError, SimulationError, warnings_in
 from yawbench.foundation.messages import printable
 
-from .options import CHANGES, MAKING, RunOptions, ScenarioFile, plan_of_scenario, takes
+from .options import CHANGES, MAKING, RunOptions, ScenarioFile, completing_names, plan_of_scenario, takes
 from .output import print_tables, say, shows_bars, tabular
 
 if TYPE_CHECKING:
@@ -27,6 +27,7 @@ MetricsOption = Annotated[
     typer.Option(
         "--metric",
         metavar="NAME",
+        autocompletion=completing_names("metrics"),
         help="Metric to print, such as 'peak(sideslip)' or 'peak(sideslip) from 1 s to 3 s'; "
         "'standard' prints the standard metrics. Repeatable.",
     ),
