@@ -14,6 +14,7 @@ from yawbench.orchestrator.scenario.schema import LoadedScenario
 from yawbench.orchestrator.signal_names import SignalName
 from yawbench.orchestrator.wiring.parameters import is_parameter, unknown_parameter, value_for
 from yawbench.vehicles.derivations import quantity_of
+from yawbench.vehicles.load import LOAD, load_of
 from yawbench.vocabulary.vehicle import CAR
 
 
@@ -56,6 +57,8 @@ class KnownFmus:
         assert not isinstance(value, FaultList)  # only faults have them
         if target.kind == "vehicle_parameter" and target.variable in CAR:
             value_for(quantity_of(target.variable), value)
+        elif target.kind == "vehicle_parameter" and target.variable == LOAD:
+            load_of(value)
         elif target.kind == "parameter":
             fmu = self._fmu(scenario, target.instance)
             if fmu is None:

@@ -31,7 +31,6 @@ from yawbench.fmus.fmu import Value, is_path
 from yawbench.foundation.errors import Diagnostic, Location, ScenarioError
 from yawbench.foundation.messages import closest, hint, listed
 from yawbench.vocabulary.facts import FACTS
-from yawbench.vocabulary.vehicle import CAR
 
 from ..fault_kinds import WORDS, FaultList
 from ..plan import VARIED, Given, Override, OverrideOrigin, ValueOrigin, ValueSource
@@ -76,9 +75,8 @@ def read_changes(
                 errors += error.diagnostics
         else:
             others = listed((*OF_RUN, *FACTS), last="or")
-            likely = closest(name, [*CAR, *OF_RUN, *FACTS])
-            meant = f"; did you mean {VEHICLE}.{likely}?" if likely in CAR else ""
-            meant = meant or (f"; did you mean {likely}?" if likely else "")
+            likely = closest(name, [*OF_RUN, *FACTS])
+            meant = f"; did you mean {likely}?" if likely else ""
             errors.append(f"--set {text}: write --set INSTANCE.PARAMETER=VALUE, or {others}=VALUE{meant}")
     at: dict[Target, FaultList] = {}
     for text in faults:

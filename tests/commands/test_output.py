@@ -14,6 +14,7 @@ from typing import Any
 import pytest
 
 from tests.commands.test_batch_commands import SCENARIO, STUDY
+from tests.refusals import mentions
 from yawbench.cli import main
 from yawbench.commands import output
 from yawbench.fmus.build import build_component
@@ -261,3 +262,11 @@ def test_a_command_that_takes_long_to_open_fmus_says_so(monkeypatch, capsys):
         pass
     assert capsys.readouterr().err == ""
     assert threading.active_count() == 1
+
+
+def test_a_quantity_of_the_car_without_its_word_is_told_with_it(capsys):
+    for setting, meant in (("mass=1200", "vehicle.mass=1200"), ("frction=0.3", "friction")):
+        with pytest.raises(SystemExit) as ended:
+            main(["run", "fnn_sideslip/25mps", "--set", setting])
+        assert ended.value.code == 2
+        assert mentions(capsys.readouterr().err, f"--set {setting}", meant)

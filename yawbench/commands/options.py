@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -68,6 +68,23 @@ def completing_names(*of: str) -> Callable[[str], list[str]]:
         return [name for name in names if name.startswith(incomplete)]
 
     return complete
+
+
+def _refuse_of_car(settings: Iterable[str]) -> None:
+    """Refuse quantities of the car without the word before them, as `mass` of `vehicle.mass`.
+
+    Raises:
+        ScenarioError: with the names that are meant.
+    """
+    from yawbench.vocabulary.vehicle import CAR
+
+    errors = []
+    for text in settings:
+        name, equals, value = (part.strip() for part in text.partition("="))
+        if equals and name in CAR:
+            errors.append(f"--set {text}: did you mean vehicle.{name}={value}, or INSTANCE.{name}={value}?")
+    if errors:
+        raise ScenarioError(errors, code="option-invalid")
 
 
 def _of_vehicle(name: str | None) -> tuple[Override, ...]:
@@ -248,6 +265,7 @@ class RunOptions:
         """The overrides for all runs."""
         from yawbench.orchestrator.scenario.overrides import read_changes
 
+        _refuse_of_car(self.set_ or ())
         return (*_of_vehicle(self.vehicle), *read_changes(self.swap or (), self.set_ or (), self.fault or ()))
 
     @property
