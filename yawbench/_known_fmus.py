@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 from yawbench.fmus.fmu import Fmu, is_path
 from yawbench.fmus.opener import Opener, find_fmu, find_folder, packaged
-from yawbench.foundation.errors import InvalidValueError, ModelDescriptionError, YawbenchError
+from yawbench.foundation.errors import InvalidValueError, Location, ModelDescriptionError, YawbenchError
 from yawbench.foundation.messages import fold, hint
 from yawbench.orchestrator.fault_kinds import FaultList
 from yawbench.orchestrator.plan import Override
@@ -25,19 +26,21 @@ class KnownFmus:
         self._scenario = scenario
         self._opener = Opener()
 
-    def find(self, fmu: str) -> None:
-        """Check that there is an FMU, or a component from which it can be built.
+    def find(self, change: Override) -> None:
+        """Check that there is the FMU of a swap, or a component from which it can be built.
 
         Raises:
             ModelDescriptionError: there is neither.
         """
-        folder = find_folder(self._scenario, opener=self._opener)
+        fmu, folder = str(change.value), find_folder(self._scenario, opener=self._opener)
         try:
             if not is_path(fmu):
                 find_fmu(fmu, scenario=self._scenario, fmus=folder, opener=self._opener, build=False)
-        except ModelDescriptionError:
+        except ModelDescriptionError as error:
             if packaged(fmu) is None and fmu not in Opener(build=True).names(folder):
-                raise
+                where = Location(target=str(change))
+                located = [replace(diagnostic, location=where) for diagnostic in error.diagnostics]
+                raise ModelDescriptionError(located) from None
 
     def problem(self, change: Override, scenario: LoadedScenario) -> ValueError | None:
         """Return why an override cannot be used, None if nothing is known against it."""

@@ -117,8 +117,9 @@ class Scenario:
                 raise ScenarioError(Diagnostic("instance-unknown", text, location=Location(self.path)))
             if arguments.names_file(wanted):
                 fmu = fmu_of(wanted, instance)
-                self._known_fmus.find(fmu)
-                changes.append(Override(Target.of_instance(instance), fmu, "swap"))
+                change = Override(Target.of_instance(instance), fmu, "swap")
+                self._known_fmus.find(change)
+                changes.append(change)
                 continue
             role = role_of(instance, Path(self._loaded.replaced.get(instance, existing[instance].fmu)).stem)
             program = PythonComponent(wanted, instance=instance, role=role, label=label)

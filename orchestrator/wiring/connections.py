@@ -18,6 +18,7 @@ from itertools import pairwise
 
 from yawbench.fmus.fmu import Variable
 from yawbench.foundation.messages import fold, hint, listed
+from yawbench.vocabulary.roles import role_in
 
 from ..plan import Wire
 from ..scenario.loader import Connection
@@ -294,13 +295,13 @@ class Connector:
     def _keeps_start(self, instance: str, variable: Variable) -> bool:
         """Return whether an input without a source may keep its start value: of an FMU made elsewhere.
 
-        That an output resembles it, is more likely a connection that was forgotten.
+        One that has the name of a role is made to be wired; and where an output resembles the input, it is
+        more likely that a connection was forgotten.
         """
-        return (
-            variable.start is not None
-            and not self._fmus[instance].role
-            and not self._similar(instance, variable)
-        )
+        fmu = self._fmus[instance]
+        if variable.start is None or fmu.role or role_in(fmu.name):
+            return False
+        return not self._similar(instance, variable)
 
     def _note_untold(self, untold: Mapping[str, Sequence[Variable]]) -> None:
         for instance, inputs in untold.items():
