@@ -23,6 +23,8 @@ LISTED = 100
 """Maximum number of names in a list. Chosen: more than any of our FMUs has parameters."""
 ALIKE = 500
 """Names compared with a wrong name; of more, those with the same beginning. Chosen: 20 ms."""
+MANY, NEAREST = 30, 8
+"""Names beyond which a hint lists the nearest alone, and how many. Chosen: three lines of a terminal, one."""
 
 
 def listed(items: Iterable[object], *, last: str = "and") -> str:
@@ -83,7 +85,10 @@ def closest(name: str, valid: Iterable[str]) -> str | None:
         alike = [lower for lower in by_lower if lower.startswith(begins)]
         by_lower = {lower: by_lower[lower] for lower in alike[:ALIKE]}
     matches = difflib.get_close_matches(name.lower(), by_lower, n=1, cutoff=0.65)
-    return by_lower[matches[0]] if matches else None
+    if matches:
+        return by_lower[matches[0]]
+    ending = [known for low, known in by_lower.items() if re.search(rf"[._/]{re.escape(name.lower())}$", low)]
+    return ending[0] if len(ending) == 1 else None  # `pid` of `controller_pid`
 
 
 def hint(name: str, valid: Iterable[str], *, lead: str) -> str:
@@ -92,6 +97,9 @@ def hint(name: str, valid: Iterable[str], *, lead: str) -> str:
     likely = closest(name, names)
     if likely is not None:
         return f"; did you mean {likely!r}?"
+    if len(names) > MANY:
+        near = difflib.get_close_matches(name, names[:ALIKE], n=NEAREST, cutoff=0.0)
+        return f"; {lead} {len(names)}, such as {listed(sorted(near))}"
     return f"; {lead}: {listed(names) or 'none'}"
 
 

@@ -31,8 +31,8 @@ Table = Mapping[str, Mapping[str, str]]
 
 def find(kind: str, name: str) -> Any:
     """Return what a package adds under a name; None if no package does."""
-    place = _place(kind, name)
-    return _imported(place) if place else None
+    where = place(kind, name)
+    return _imported(where) if where else None
 
 
 def require(kind: str, name: str) -> Any:
@@ -41,11 +41,11 @@ def require(kind: str, name: str) -> Any:
     Raises:
         ScenarioError: no package does.
     """
-    if not (place := _place(kind, name)):
+    if not (where := place(kind, name)):
         raise ScenarioError(
             f"{name}: the part of yawbench that makes this ({kind}) is not installed", code="part-missing"
         )
-    return _imported(place)
+    return _imported(where)
 
 
 def names(kind: str) -> list[str]:
@@ -53,7 +53,8 @@ def names(kind: str) -> list[str]:
     return [*dict.fromkeys(name for table in (_ours, _of_others) for name in table().get(kind, {}))]
 
 
-def _place(kind: str, name: str) -> str:
+def place(kind: str, name: str) -> str:
+    """Return the module and attribute under a name, without importing them; "" if no package adds it."""
     places = (table().get(kind, {}).get(name, "") for table in (_ours, _of_others))
     return next(filter(None, places), "")
 

@@ -268,7 +268,7 @@ class Run:
             ResultsError: no recorded signal can be drawn.
         """
         from yawbench.figures.display import LabelledRun
-        from yawbench.figures.plots import OVERVIEW, draw
+        from yawbench.figures.plots import draw, overview_of
 
         from .figures import panels as drawing
 
@@ -276,7 +276,7 @@ class Run:
         title = None if title is None else arguments.text(title, "title")
         runs = [LabelledRun(self.title, *filtered_alike([self.results]))]
         drawing.check_panels(runs, wanted, option="panel ")
-        return shown_in_notebooks(draw(runs, wanted or OVERVIEW, title=title))
+        return shown_in_notebooks(draw(runs, wanted or overview_of(runs), title=title))
 
     def save(self, folder: str | Path, *, format: str = "csv") -> Path:
         """Write results and run.json, as `yawbench run` does, and return the folder.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from html import escape
@@ -18,6 +18,7 @@ from yawbench.foundation.errors import (
     ScenarioError,
     SimulationError,
     YawbenchWarning,
+    code_of,
     text_of,
     warnings_in,
 )
@@ -36,6 +37,7 @@ from yawbench.vocabulary.roles import role_of
 
 from . import arguments
 from ._controller import ControllerLike, PythonComponent
+from ._known_fmus import KnownFmus
 from ._progress import bar
 from ._run import Run
 from ._run_many import opener_of, planner_of
@@ -117,7 +119,10 @@ class Scenario:
                 text = f"there is no instance {short(instance)}{hint(instance, existing, lead='instances')}"
                 raise ScenarioError(Diagnostic("instance-unknown", text, location=Location(self.path)))
             if arguments.names_file(wanted):
-                changes.append(Override(Target.of_instance(instance), fmu_of(wanted, instance), "swap"))
+                fmu = fmu_of(wanted, instance)
+                change = Override(Target.of_instance(instance), fmu, "swap")
+                self._known_fmus.find(change)
+                changes.append(change)
                 continue
             role = role_of(instance, Path(self._loaded.replaced.get(instance, existing[instance].fmu)).stem)
             program = PythonComponent(wanted, instance=instance, role=role, label=label)
@@ -173,8 +178,28 @@ class Scenario:
             plain = {targets[name]: _plain(targets[name], value) for name, value in entries.items()}
         changed = [setting(target, value, "set") for target, value in plain.items()]
         scenario = replace(self, changes=(*self.changes, *changed))
-        scenario._loaded  # noqa: B018 - raises now if it is invalid
+        scenario._check(changed)
         return scenario
+
+    def _check(self, changes: Sequence[Override]) -> None:
+        """Check overrides of values, as far as the FMUs that are up to date tell.
+
+        Raises:
+            ScenarioError: a target or value is invalid; lists all errors.
+        """
+        loaded = self._loaded
+        wrong = {change: self._known_fmus.problem(change, loaded) for change in changes}
+        errors = [
+            Diagnostic(code_of(error), str(error), location=Location(target=str(change)))
+            for change, error in wrong.items()
+            if error is not None
+        ]
+        if errors:
+            raise ScenarioError(errors)
+
+    @cached_property
+    def _known_fmus(self) -> KnownFmus:
+        return KnownFmus(self.path)
 
     def fault(
         self,

@@ -27,7 +27,11 @@ from yawbench.foundation.errors import (
 from yawbench.foundation.interrupts import terminable
 from yawbench.foundation.messages import cut, printable
 
+from . import overview
 from .commands import output
+
+COMPLETION = "_YAWBENCH_COMPLETE"
+"""Environment variable by which a shell asks for completions; the name is click's."""
 
 
 class _Commands(TyperGroup):
@@ -78,22 +82,37 @@ def _interruption_in(error: BaseException | None) -> KeyboardInterrupt | None:
     return error
 
 
-def _application(arguments: Sequence[str] = ()) -> typer.Typer:
-    """Return the application with the called command only, which starts faster; without one, with all."""
-    known = plugins.find("command", arguments[0]) if arguments else None
-    called = arguments[:1] if known else plugins.names("command")
+def _application(arguments: Sequence[str] = (), *, whole: bool = False) -> typer.Typer:
+    """Return the application with the called command, which starts faster than with all.
+
+    Where it is not known yet (a shell completes a line, which is in the environment then) or misspelt, the
+    others are there by their names alone; `whole`: all are there.
+    """
+    completing = COMPLETION in os.environ
+    line = os.environ.get("COMP_WORDS") or os.environ.get("_TYPER_COMPLETE_ARGS") or ""
+    called = (line.split()[1:] if completing else [*arguments])[:1]
+    begun = not completing or len(line.split()) > 2 or line.endswith(" ")
+    alone = not whole and begun and bool(called and plugins.place("command", called[0]))
     app = typer.Typer(
         name="yawbench",
         cls=_Commands,
         no_args_is_help=True,
         pretty_exceptions_enable=False,
         rich_markup_mode=None,
+        context_settings={"help_option_names": [*overview.HELP]},
     )
     app.callback()(_options)
-    for name in called:
-        command = plugins.find("command", name)
-        app.command(name)(output.with_forms(command) if hasattr(command, "tabular") else command)
+    for name in called if alone else plugins.names("command"):
+        if whole or name in called:
+            command = plugins.find("command", name)
+            app.command(name)(output.with_forms(command) if hasattr(command, "tabular") else command)
+        else:
+            app.command(name, help=overview.first_line(name))(_nothing)
     return app
+
+
+def _nothing() -> None:
+    """Stand for a command whose name alone is needed."""
 
 
 def _print_version(requested: bool) -> None:
@@ -110,7 +129,10 @@ def _options(
         typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version."),
     ] = False,
 ) -> None:
-    """A test bench for vehicle yaw-stability control made of FMI units."""
+    pass
+
+
+_options.__doc__ = overview.ABOUT
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -147,6 +169,9 @@ def _status(arguments: Sequence[str]) -> int:
         try:
             with _interruptible(), warnings.catch_warnings():
                 hide_library_warnings()
+                if COMPLETION not in os.environ and (text := overview.answer(arguments)) is not None:
+                    print(text)
+                    return 0
                 _application(arguments)(arguments)
         except SystemExit as ended:
             return ended.code if isinstance(ended.code, int) else int(ended.code is not None)

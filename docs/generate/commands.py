@@ -18,7 +18,7 @@ _KIND = re.compile(r" <(?:path|str|text|list\[\w+\])>$")
 
 def page() -> str:
     """Return the page of all subcommands with their arguments and options."""
-    group = typer.main.get_command(_application())
+    group = typer.main.get_command(_application(whole=True))
     parts = ["# Commands", NOTE, _INTRODUCTION]
     for name, command in group.commands.items():  # type: ignore[attr-defined]
         context = click.Context(command, info_name=f"yawbench {name}")

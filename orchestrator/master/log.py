@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import itertools
+import os
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -34,6 +35,10 @@ PROCESS = "yawbench process"
 KILLED = "yawbench process killed"
 """Category of that message if the process was killed by something else; always kept."""
 
+EVERYTHING = "YAWBENCH_LOG"
+"""Environment variable, which reaches the processes of isolated instances, too: with `info`, messages with
+the status OK are heard."""
+
 _HAS_TIME = re.compile(r"^[^:]* failed at t = [^:]* s: ")
 _CONTROLS = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")
 
@@ -55,10 +60,16 @@ class Message:
 
 
 class Log:
-    """The messages of a run with a status worse than OK, in order of arrival."""
+    """The messages of a run with a status worse than OK, in order of arrival.
 
-    def __init__(self) -> None:
+    Args:
+        hear: called with every message at once, those of the status OK if `EVERYTHING` asks for them.
+    """
+
+    def __init__(self, hear: Callable[[Message], None] | None = None) -> None:
         self.messages: list[Message] = []
+        self._hear = hear
+        self._everything = os.environ.get(EVERYTHING) == "info"
         self.dropped = 0
         self._counts: Counter[str] = Counter()
         self._muted = False
@@ -74,20 +85,27 @@ class Log:
             self._muted = False
 
     def add(self, instance: str, status: int, category: str, text: str, time: float | None = None) -> None:
-        """Add a message; those with the status OK are ignored.
+        """Add a message; those with the status OK are not kept.
 
         Args:
             time: simulation time that it is about [s]; default: the last communication point.
         """
         status = known(status)
-        if status == OK or (self._muted and category not in (MASTER, PROCESS, KILLED)):
+        if self._muted and category not in (MASTER, PROCESS, KILLED):
+            return
+        at = self.time.value if time is None else time
+        message = Message(instance, at, status, category, text[:LONGEST].rstrip())
+        if status == OK and not self._everything:
+            return
+        if self._hear is not None:
+            self._hear(message)
+        if status == OK:
             return
         self._counts[instance] += 1
         if self._counts[instance] > KEPT and category not in (MASTER, PROCESS, KILLED):
             self.drop(1)
             return
-        at = self.time.value if time is None else time
-        self.messages.append(Message(instance, at, status, category, text[:LONGEST].rstrip()))
+        self.messages.append(message)
 
     def drop(self, count: int) -> None:
         """Count messages that are not kept."""
@@ -142,9 +160,14 @@ class LogRelay(Log):
         kept = len(self.messages)
         super().add(instance, status, category, text, time)
         if len(self.messages) > kept:
-            last = self.messages[-1]
-            at = last.time if self._timed else None
-            self._channel.send("log", (instance, last.status, category, last.text, at))
+            self._send(self.messages[-1])
+        elif status == OK and self._everything and not self._muted:
+            at = self.time.value if time is None else time
+            self._send(Message(instance, at, OK, category, text[:LONGEST].rstrip()))
+
+    def _send(self, message: Message) -> None:
+        at = message.time if self._timed else None
+        self._channel.send("log", (message.instance, message.status, message.category, message.text, at))
 
     def finish(self) -> None:
         """Pass on the number of messages dropped since the last call."""

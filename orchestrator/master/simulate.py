@@ -7,6 +7,7 @@ import os
 import sys
 import time
 import uuid
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from datetime import datetime, timezone
 from pathlib import Path
@@ -85,6 +86,7 @@ def simulate(
     format: str = "csv",
     apart: bool = False,
     pace: float | None = None,
+    hear: Callable[[Message], None] | None = None,
 ) -> RunInfo:
     """Run a plan and write its results (`results.csv`) and `run.json` into the folder `out`.
 
@@ -105,6 +107,7 @@ def simulate(
             has a process of its own: even if it crashes, the run ends with an error message and the results
             so far.
         pace: simulated seconds per second; None: as fast as possible.
+        hear: called with the messages of the instances as they arrive.
 
     Raises:
         ScenarioError: `format` is unknown.
@@ -115,7 +118,7 @@ def simulate(
     """
     recorder = recorder_of(format)(Path(out), *_columns(plan))
     apart = apart and can_be_apart() and not keeps(plan) and not isinstance(opener, Isolation)
-    run = Simulation(plan, recorder, progress, watch, apart=apart)
+    run = Simulation(plan, recorder, progress, watch, apart=apart, hear=hear)
     run.course.pace = pace
     run.make(opener)
     return RunInfo(
@@ -179,6 +182,7 @@ class Simulation:
 
     Args:
         apart: step the instances in a child process (see `child_run`).
+        hear: called with the messages of the instances as they arrive.
     """
 
     def __init__(
@@ -189,13 +193,14 @@ class Simulation:
         watch: Watch | None,
         *,
         apart: bool,
+        hear: Callable[[Message], None] | None = None,
     ) -> None:
         self.plan = plan
         self.recorder = recorder
         self._watch = watch
         if watch:
             recorder.looks.append(watch.look)
-        self.log = Log()
+        self.log = Log(hear)
         self.record = run_record(plan, status=RunStatus.RUNNING, started=datetime.now(timezone.utc))
         self.record.id, self.record.key = uuid.uuid4().hex[:12], key_of(plan)
         self._apart = apart

@@ -21,13 +21,12 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, Protocol
 
-import numpy as np
-
 from yawbench.foundation.errors import ResultsError, ScenarioError
 from yawbench.foundation.messages import hint, in_bytes
 from yawbench.foundation.safe_files import open_regular
 
 if TYPE_CHECKING:
+    import numpy as np
     import pyarrow as pa
 
     from ..plan import Plan
@@ -144,14 +143,12 @@ def size_note(plan: Plan, folder: Path, format: str) -> str | None:
     return f"{note}; {shorter}"
 
 
-REAL = np.dtype(float)
-
-
 def column_of(values: np.ndarray) -> pa.Array:
     """Return an array as an Arrow column."""
+    import numpy as np
     import pyarrow as pa
 
-    if values.dtype != REAL:
+    if values.dtype != float:
         return pa.array(values)
     memory = pa.py_buffer(np.ascontiguousarray(values))
     return pa.Array.from_buffers(pa.float64(), len(values), [None, memory])
@@ -159,13 +156,15 @@ def column_of(values: np.ndarray) -> pa.Array:
 
 def values_of(column: pa.Array) -> np.ndarray:
     """Return an Arrow column as an array."""
+    import numpy as np
     import pyarrow as pa
 
     if column.type != pa.float64() or column.null_count or not len(column):
         copied: np.ndarray = column.to_numpy(zero_copy_only=False)
         return copied
     _, memory = column.buffers()
-    return np.frombuffer(memory, REAL, len(column), REAL.itemsize * column.offset)
+    real = np.dtype(float)
+    return np.frombuffer(memory, real, len(column), real.itemsize * column.offset)
 
 
 BLOCK = 8_000_000
@@ -180,6 +179,8 @@ def rows_text(block: np.ndarray) -> bytes:
     """Return rows of numbers as lines of CSV; shape (rows, columns)."""
     writer = _writer()
     if writer is not None:
+        import numpy as np  # slow to import, and most commands ask for the names of formats alone
+
         return writer(np.ascontiguousarray(block))
     # repr of a list of lists is the fastest way in Python to format many shortest decimal numbers
     return (repr(block.tolist())[2:-2].replace("], [", "\n").replace(", ", ",") + "\n").encode()
@@ -188,6 +189,8 @@ def rows_text(block: np.ndarray) -> bytes:
 @functools.cache
 def _writer() -> Callable[[np.ndarray], bytes] | None:
     """Return the function in C, with its tables; None if it cannot be compiled here."""
+    import numpy as np
+
     from yawbench.fmus.compiler import load_compiled
 
     library, _ = load_compiled(Path(__file__).with_name("rows_text.c"))

@@ -22,6 +22,8 @@ YAML = (".yaml", ".yml")
 ENDINGS = (*YAML, ".ssp")
 ARCHIVES = (".ssp", ".ssd")
 """Endings of an SSP archive, and of a description in one."""
+FMU = ".fmu"
+"""Ending of an FMU, which alone is a scenario, too (`fmu_alone`)."""
 LOOKED_AT = 20_000
 """Maximum number of examined entries of a folder. Chosen: a second, and more than real folders have."""
 COMMANDS = {
@@ -49,7 +51,7 @@ def folders() -> list[Path]:
 
 def kind_of(path: Path) -> str:
     """Guess the kind of a file (`schema_validation.KINDS`) from its keys, unparsed; "" if unknown."""
-    if path.suffix.lower() in ARCHIVES:
+    if path.suffix.lower() in (*ARCHIVES, FMU):
         return "a scenario"
     try:
         keys = _KEY.findall(read_bytes(path, largest=TEXT).decode("utf-8-sig"))
@@ -111,6 +113,23 @@ def named(name: str | Path, kind: str = "") -> Path | None:
     return next((path for path in candidates if os.path.isfile(path)), None)
 
 
+def beside(file: Path, name: str, kind: str) -> Path:
+    """Return the file that another one names: by a relative path, else by its name in a folder of scenarios.
+
+    If there is none, what the path would be.
+    """
+    path = Path(os.path.normpath(file.parent / name))
+    if Path(name).suffix in ENDINGS or os.path.exists(path):
+        return path
+    candidates = (
+        folder / home / f"{name}{ending}"
+        for folder in folders()
+        for home in dict.fromkeys((HOMES.get(kind, ""), ""))
+        for ending in ENDINGS
+    )
+    return next((found.absolute() for found in candidates if os.path.isfile(found)), path)
+
+
 def find(source: str | Path, kind: str) -> Path:
     """Find a file by its path, or by its name in a folder of scenarios.
 
@@ -126,7 +145,7 @@ def find(source: str | Path, kind: str) -> Path:
         return path
     known = [name.removeprefix(f"{HOMES.get(kind)}/") for name in names(kind)]
     elsewhere = [name for name in known if path.stem == name.rpartition("/")[2]]
-    if (path.suffix in ENDINGS and not elsewhere) or path.suffix.lower() in ARCHIVES:
+    if (path.suffix in ENDINGS and not elsewhere) or path.suffix.lower() in (*ARCHIVES, FMU):
         return path
     if file := named(source, kind):
         return file

@@ -14,7 +14,7 @@ from yawbench.foundation.safe_files import reads
 
 from ..plan import Override
 from . import overrides, quantities, schema_validation, yaml_lines
-from .catalogue import ARCHIVES
+from .catalogue import ARCHIVES, FMU, beside
 from .schema import Connection, LoadedScenario, PropertyFile, ScenarioSpec, Vehicle, endpoint
 from .yaml_lines import Document, KeyPath
 
@@ -34,10 +34,10 @@ def load_scenario(
     read_tyre: Callable[[str], PropertyFile] | None = None,
     validate: bool = True,
 ) -> LoadedScenario:
-    """Read a scenario file, or an SSP archive.
+    """Read a scenario file, an SSP archive, or an FMU alone.
 
     Args:
-        path: the YAML file, or the archive; of an archive with variants also `system.ssp/other.ssd`.
+        path: the YAML file, the FMU, or the archive; of an archive with variants also `system.ssp/other.ssd`.
         changes: overrides of the file; see `overrides`.
         data: its content, if there is no such file: messages name `path`.
         read: reads a file, called like `yaml_lines.read`; the returned document is modified.
@@ -47,17 +47,17 @@ def load_scenario(
     Raises:
         ScenarioError: with all errors of the file, its vehicle file and the overrides.
     """
-    archive = Path(path).suffix.lower() in ARCHIVES
+    other = _other_reader(Path(path))
     if data is not None:
         document = Document(Path(path), data=data)
     else:
-        document = _read_archive(Path(path)) if archive else read(Path(path), what="scenario file")
+        document = other.read(Path(path)) if other else read(Path(path), what="scenario file")
     wanted = changes if isinstance(document.data, dict) else ()
     overrides.apply_vehicle(document, wanted)
     vehicle_document = _read_vehicle(document, read)
     replaced, effective = overrides.apply_changes(document, vehicle_document, wanted)
-    if archive and isinstance(document.data, dict):
-        _ask_for_times(document)
+    if other and isinstance(document.data, dict) and (missing := other.missing_times(document)):
+        raise ScenarioError(document.sorted_errors() + missing)
     if not validate:
         overrides.leave_unvalidated(document)
 
@@ -80,30 +80,30 @@ def load_scenario(
         tyre_files=tyres,
         replaced=replaced,
         changes=effective,
-        explicit=archive,
+        explicit=other is not None,
     )
 
 
-def _read_archive(path: Path) -> Document:
-    from . import ssp_read  # lxml takes long to import, and scenario files do not need it
+def _other_reader(path: Path) -> Any:
+    """Return the module that reads and asks about what is not a scenario file, None if it is one."""
+    if path.suffix.lower() in ARCHIVES:
+        from . import ssp_read  # lxml takes long to import, and scenario files do not need it
 
-    return ssp_read.read(path)
+        return ssp_read
+    if path.suffix.lower() == FMU:
+        from . import fmu_alone
 
-
-def _ask_for_times(document: Document) -> None:
-    """Refuse an archive without stop time or step size (as from other tools) if no option gives it."""
-    from . import ssp_read
-
-    missing = ssp_read.missing_times(document)
-    if missing:
-        raise ScenarioError(document.sorted_errors() + missing)
+        return fmu_alone
+    return None
 
 
 def _read_vehicle(document: Document, read: Callable[..., Document]) -> Document:
     name = document.data.get("vehicle") if isinstance(document.data, dict) else None
     if not isinstance(name, str):
         return Document(document.path, data={})
-    vehicle = Path(os.path.normpath(document.path.parent / name))
+    vehicle = beside(document.path, name, "a vehicle file")
+    if vehicle != Path(os.path.normpath(document.path.parent / name)):  # as a path from here on
+        document.data = yaml_lines.put(document.data, ("vehicle",), str(vehicle))
     if not os.path.exists(vehicle):
         (missing,) = read(vehicle, what="vehicle file").errors
         document.report(("vehicle",), str(missing), missing.code)

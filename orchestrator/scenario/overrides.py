@@ -29,7 +29,7 @@ from typing import Any
 
 from yawbench.fmus.fmu import Value, is_path
 from yawbench.foundation.errors import Diagnostic, Location, ScenarioError
-from yawbench.foundation.messages import hint, listed
+from yawbench.foundation.messages import closest, hint, listed
 from yawbench.vocabulary.facts import FACTS
 
 from ..fault_kinds import WORDS, FaultList
@@ -75,7 +75,9 @@ def read_changes(
                 errors += error.diagnostics
         else:
             others = listed((*OF_RUN, *FACTS), last="or")
-            errors.append(f"--set {text}: write --set INSTANCE.PARAMETER=VALUE, or {others}=VALUE")
+            likely = closest(name, [*OF_RUN, *FACTS])
+            meant = f"; did you mean {likely}?" if likely else ""
+            errors.append(f"--set {text}: write --set INSTANCE.PARAMETER=VALUE, or {others}=VALUE{meant}")
     at: dict[Target, FaultList] = {}
     for text in faults:
         location, colon, line = (part.strip() for part in text.partition(":"))

@@ -5,18 +5,20 @@ the same name, other constants.
 
 An input that its FMU declares as optional, and that nothing drives, keeps its start value: it is listed
 among the constants, so it is shown and recorded like them. The same holds for any input in an SSP archive,
-where nothing is connected by equal names.
+where nothing is connected by equal names, and, with a note, for an input of an FMU made elsewhere that no
+output resembles.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Set
+from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import replace
 from graphlib import CycleError
 from itertools import pairwise
 
 from yawbench.fmus.fmu import Variable
 from yawbench.foundation.messages import fold, hint, listed
+from yawbench.vocabulary.roles import role_in
 
 from ..plan import PARAMETERS, Wire
 from ..scenario.loader import Connection
@@ -65,14 +67,19 @@ class Connector:
         self._refuse_overruled(by_input, wires)
         fed = wires.keys() | by_input.keys() | ambiguous
         kept = []
+        untold: dict[str, list[Variable]] = {}  # instance -> its inputs that nothing resembles
         for instance, inputs in self._inputs.items():
             for name, variable in inputs.items():
                 if (instance, name) in fed:
                     continue
                 if (variable.optional or self._explicit(instance)) and variable.start is not None:
                     kept.append((instance, name))
+                elif self._keeps_start(instance, variable):
+                    kept.append((instance, name))
+                    untold.setdefault(instance, []).append(variable)
                 else:
                     self._report(("units", instance), self._undriven(instance, variable), "input-undriven")
+        self._note_untold(untold)
         fitted = [self._fitted(wire, key) for wire, key in wires.values()]
         self._note_units(wire for wire, key in wires.values() if self._scale(key) is None)
         return fitted, kept
@@ -324,8 +331,30 @@ class Connector:
                 "constant-overruled",
             )
 
-    def _undriven(self, instance: str, variable: Variable) -> str:
-        """Return the message for an input without a source."""
+    def _keeps_start(self, instance: str, variable: Variable) -> bool:
+        """Return whether an input without a source may keep its start value: of an FMU made elsewhere.
+
+        One that has the name of a role is made to be wired; and where an output resembles the input, it is
+        more likely that a connection was forgotten.
+        """
+        fmu = self._fmus[instance]
+        if variable.start is None or fmu.role or role_in(fmu.name):
+            return False
+        return not self._similar(instance, variable)
+
+    def _note_untold(self, untold: Mapping[str, Sequence[Variable]]) -> None:
+        for instance, inputs in untold.items():
+            values = ", ".join(f"{v.name} = {v.start}{f' {v.unit}' if v.unit else ''}" for v in inputs)
+            have = (
+                "has no source and keeps its start value"
+                if len(inputs) == 1
+                else ("have no source and keep their start values")
+            )
+            what = "input" if len(inputs) == 1 else "inputs"
+            self._system.note("input-kept", f"{what} of {instance} {have}: {values}")
+
+    def _similar(self, instance: str, variable: Variable) -> list[str]:
+        """Return the outputs of other instances that resemble an input most."""
         shared = {
             f"{source}.{name}": alike(name, variable.name, self._symbols)
             for source, names in self._fitting_outputs(variable).items()
@@ -333,7 +362,11 @@ class Connector:
             for name in names
         }
         most = max(shared.values(), default=0)
-        choices = [output for output, words in shared.items() if words == most > 0]
+        return [output for output, words in shared.items() if words == most > 0]
+
+    def _undriven(self, instance: str, variable: Variable) -> str:
+        """Return the message for an input without a source."""
+        choices = self._similar(instance, variable)
         connect = f"connect {listed(choices, last='or')}, or give" if 0 < len(choices) <= 8 else "give"
         measure = f" [{variable.unit}]" if variable.unit else ""
         return (

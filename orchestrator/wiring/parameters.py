@@ -236,7 +236,7 @@ class Parameters:
                 sentence = f"{instance}.{name} is left out: {fmu.name} has no such parameter"
                 self.system.note("left-out-after-swap", sentence)
             else:
-                self.system.report(given.where, _unknown(instance, fmu, name), "parameter-unknown")
+                self.system.report(given.where, unknown_parameter(instance, fmu, name), "parameter-unknown")
         elif not isinstance(value, TextSpec):
             self.give(instance, name, given)
         elif fmu.variables[name].type != "String":
@@ -306,7 +306,8 @@ def is_parameter(fmu: Fmu, name: str) -> bool:
     return name in fmu.variables and fmu.variables[name].causality in PARAMETERS
 
 
-def _unknown(instance: str, fmu: Fmu, name: str) -> str:
+def unknown_parameter(instance: str, fmu: Fmu, name: str) -> str:
+    """Return the message on a name that is no parameter of an instance."""
     if name in fmu.variables and fmu.variables[name].causality == "input":
         return f"{name!r} is an input of {instance} here, not a parameter: give constants under 'inputs'"
     if name in fmu.refused:

@@ -13,8 +13,9 @@ from pathlib import Path
 import pytest
 import typer
 
+from tests.checkout import ROOT, run_in
 from tests.refusals import each_mentions, mentions
-from yawbench import cli
+from yawbench import cli, overview
 from yawbench.cli import _application, main
 from yawbench.foundation import plugins
 from yawbench.foundation.errors import Interrupted, ScenarioError
@@ -29,6 +30,29 @@ def say(capsys, *arguments):
 
 def test_the_version_is_that_of_the_installed_distribution(capsys):
     assert say(capsys, "--version") == (0, f"yawbench {version('yawbench')}\n")
+
+
+def test_help_and_version_import_nothing_of_what_they_tell():
+    for argument in ("--help", "-h", "--version"):
+        program = (
+            "import os, sys; import yawbench.__main__ as m\n"
+            "os._exit = lambda status: sys.exit(status)\n"
+            "try: m.main()\n"
+            "except SystemExit: print(*sorted(sys.modules), file=sys.stderr)"
+        )
+        done = run_in(ROOT, "python", "-c", program, argument)
+        loaded = {*done.stderr.split()}
+        assert done.stdout and not loaded & {"typer", "click", "numpy", "pydantic", "yawbench.cli"}
+
+
+def test_the_overview_has_every_command_with_the_first_line_of_its_docstring():
+    grouped = [name for names in overview.GROUPS.values() for name in names]
+    assert len(grouped) == len({*grouped}) and {*grouped} <= {*plugins.names("command")}
+    text = " ".join(overview.overview().split())
+    for name in plugins.names("command"):
+        line = (plugins.find("command", name).__doc__ or "").splitlines()[0]
+        assert overview.first_line(name) == line
+        assert f"{name} {line}" in text
 
 
 def test_the_help_names_every_command(capsys):
@@ -47,13 +71,13 @@ def test_an_error_of_the_program_itself_is_a_sentence_that_says_so(
 
     monkeypatch.setattr(cli, "_application", lambda _: broken)
     with pytest.raises(SystemExit) as ended:
-        cli.main([])
+        cli.main(["list"])
     said = capsys.readouterr().err
     assert ended.value.code == 1
     assert each_mentions(said, ("ZeroDivisionError", "test_cli.py", "YAWBENCH_TRACEBACK", "1 shows"))
     monkeypatch.setenv(cli.TRACEBACK, "1")
     with pytest.raises(SystemExit):
-        cli.main([])
+        cli.main(["list"])
     said = capsys.readouterr().err
     assert mentions(said, "Traceback")
     assert mentions(said, "test_cli.py", "broken")
@@ -108,7 +132,7 @@ def test_a_working_folder_that_is_gone_is_one_sentence(tmp_path):
 def test_every_command_that_sets_parameters_takes_faults() -> None:
     options = {
         name: {one for parameter in command.params for one in parameter.opts}
-        for name, command in typer.main.get_command(_application()).commands.items()  # type: ignore[attr-defined]
+        for name, command in typer.main.get_command(_application(whole=True)).commands.items()  # type: ignore[attr-defined]
     }
     setting = {name for name, own in options.items() if "--set" in own}
     assert len(setting) > 8
@@ -162,7 +186,7 @@ def test_nothing_that_turns_the_text_reaches_the_terminal_even_in_a_traceback(
     monkeypatch.setattr(cli, "_application", lambda _: broken)
     monkeypatch.setenv(cli.TRACEBACK, shown)
     with pytest.raises(SystemExit):
-        main([])
+        main(["list"])
     said = capsys.readouterr().err
     assert ("Traceback" in said) == bool(shown)
     assert r"\u202etxt.exe \x1b[31m \u2066 \x9b" in said

@@ -15,6 +15,9 @@ from tests.refusals import each_mentions, mentions
 from yawbench.cli import main
 from yawbench.fmus.build import build_all
 from yawbench.orchestrator.results.reader import load_results
+from yawbench.orchestrator.scenario import catalogue
+from yawbench.orchestrator.scenario.loader import load_scenario
+from yawbench.vehicles.tir import read_tir
 
 UNITS = (
     "driver_sine", "reference_steady_state", "controller_off", "controller_fnn", "controller_fuzzy_sideslip",
@@ -156,6 +159,22 @@ def test_in_a_checkout_the_files_stand_among_its_own_and_build_finds_them(tmp_pa
     assert "10 passed" in run_in(checkout, "python", "-m", "pytest", "-q", *tests).stdout
     shutil.rmtree(checkout / "components/controllers/idea_c")
     assert mentions(run_in(checkout, "yawbench", "build").stderr, "controller_idea_c", "removed")
+
+
+def test_a_scenario_begins_as_another_whose_files_it_still_finds(tmp_path, new):
+    assert new("mine", "--from", "tyre_file/lane_change", kind="scenario")[0] == 0
+    copied = tmp_path / "scenarios/mine/lane_change.yaml"
+    original = catalogue.find("tyre_file/lane_change", "a scenario")
+    one, other = (load_scenario(path, read_tyre=read_tir) for path in (original, copied))
+    for scenario, path in ((one, original), (other, copied)):
+        assert (path.parent / scenario.vehicle).is_file()
+    assert one.vehicle_file.values == other.vehicle_file.values
+    assert [file.sha256 for file in one.tyre_files.values()] == [f.sha256 for f in other.tyre_files.values()]
+    assert {name: unit.fmu for name, unit in one.units.items()} == {
+        name: unit.fmu for name, unit in other.units.items()
+    }
+    assert new("other", "--from", "no/such", kind="scenario")[0] == 2
+    assert new("other", "--from", "tyre_file/lane_change", kind="sweep")[0] == 2
 
 
 def test_nothing_is_overwritten_and_nothing_is_written_beside_what_exists(tmp_path, new):

@@ -6,12 +6,15 @@ import json
 import re
 import subprocess
 import sys
+import threading
+import time
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from tests.commands.test_batch_commands import SCENARIO, STUDY
+from tests.refusals import mentions
 from yawbench.cli import main
 from yawbench.commands import output
 from yawbench.fmus.build import build_component
@@ -247,3 +250,23 @@ def test_a_limit_whose_runs_are_missing_is_unknown(answers, tmp_path):
     assert made["tables"][-1]["rows"] == [["20.0", "unknown (30.0 not made)"]]
     (limit,) = made["experiments"][0]["record"]["limits"]["top"]
     assert (limit["up_to"], limit["not_at"], limit["why"]) == (20.0, None, "not made")
+
+
+def test_a_command_that_takes_long_to_open_fmus_says_so(monkeypatch, capsys):
+    monkeypatch.setattr(output, "PATIENCE", 0.01)
+    with output.announced("building"):
+        time.sleep(0.1)
+    assert capsys.readouterr().err == "building\n"
+    monkeypatch.setattr(output, "PATIENCE", 60.0)
+    with output.announced("building"):
+        pass
+    assert capsys.readouterr().err == ""
+    assert threading.active_count() == 1
+
+
+def test_a_quantity_of_the_car_without_its_word_is_told_with_it(capsys):
+    for setting, meant in (("mass=1200", "vehicle.mass=1200"), ("frction=0.3", "friction")):
+        with pytest.raises(SystemExit) as ended:
+            main(["run", "fnn_sideslip/25mps", "--set", setting])
+        assert ended.value.code == 2
+        assert mentions(capsys.readouterr().err, f"--set {setting}", meant)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -13,7 +14,10 @@ from tests.checkout import ROOT
 from tests.command_line import status_of
 from tests.commands.test_batch_commands import SCENARIO, STUDY
 from tests.measured_cars.test_validation import line
+from tests.refusals import mentions
+from yawbench.commands.judged import JudgedCase, to_junit
 from yawbench.fmus.build import build_component
+from yawbench.metrics.verdict import Status
 
 UNITS = ("driver_sine", "reference_steady_state", "controller_off", "controller_fuzzy_sideslip")
 PAGE = ROOT / "docs/running.md"
@@ -63,6 +67,8 @@ def folder(tmp_path, monkeypatch, fmus):
         ([], "evaluate step-steer step.yaml --no-figures", 0, "success"),
         ([], "evaluate step-steer still.yaml --no-figures", 1, "could judge nothing"),
         ([], "study study.yaml --no-run", 1, "is not made"),
+        ([], "study study.yaml --strict", 1, "`--strict`"),
+        ([], "evaluate step-steer step.yaml --no-figures --strict", 0, "success"),
         ([], "run half.yaml --set driver.amplitud=1", 2, "a name"),
         ([], "run half.yaml --sett a=1", 2, "an option"),
         ([], "run nowhere.yaml", 2, "a file"),
@@ -81,6 +87,37 @@ def test_commands_end_with_the_status_that_the_page_tells(
     assert [ended(text) for text in before] == [0] * len(before), capsys.readouterr().err
     assert ended(command) == status, capsys.readouterr().err
     assert words in statuses()[status]
+
+
+def test_a_junit_report_has_every_verdict(folder, fmus, tmp_path):
+    status = status_of("study", "study.yaml", "--fmus", fmus, "--junit", "verdicts.xml")
+    assert status == 0
+    root = ElementTree.parse("verdicts.xml").getroot()
+    cases = {case.get("name"): [child.tag for child in case] for case in root.iter("testcase")}
+    assert cases == {"Without control there is no moment.": [], "Control is gentle.": ["failure"]}
+    assert (root.get("tests"), root.get("failures")) == ("2", "1")
+    assert mentions(root.find(".//failure").get("message"), "does not reproduce", "N·m")
+    assert status_of("validate", "turn", "--measured", "far.yaml", "--junit", "v.xml", "--out", "v") == 1
+    assert ElementTree.parse("v.xml").getroot().get("failures") == "1"
+    assert (
+        status_of("validate", "turn", "--measured", "near.yaml", "--junit", "v.xml", "--strict", "--out", "v")
+        == 0
+    )
+    assert ElementTree.parse("v.xml").getroot().get("failures") == "0"
+
+
+def test_a_run_that_fails_is_an_error_of_the_report_and_what_was_not_judged_is_skipped():
+    cases = [
+        JudgedCase("A", "run", None, "not completed", "division by zero"),
+        JudgedCase("A", "claim <1>", Status.UNDECIDED, "undecided", "chance"),
+        JudgedCase("B", "claim", Status.PASSED, "holds"),
+    ]
+    root = ElementTree.fromstring(to_junit(cases).encode())
+    assert [suite.get("name") for suite in root] == ["A", "B"]
+    assert {name: root.get(name) for name in ("tests", "failures", "errors", "skipped")} == {
+        "tests": "3", "failures": "0", "errors": "1", "skipped": "1",
+    }  # fmt: skip
+    assert root.find(".//error").get("message") == "not completed: division by zero"
 
 
 def test_a_failed_run_ends_with_1_and_an_interrupted_one_with_130(folder, fmus, tmp_path, monkeypatch):

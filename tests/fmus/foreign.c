@@ -80,6 +80,9 @@ EXPORT fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolea
         in->done = t > 0.249;
         return in->done ? fmi2Discard : fmi2OK;
     }
+    if (!strcmp(in->guid, "{chatty}")) {
+        in->host.logger(in->host.componentEnvironment, in->name, fmi2OK, "steps", "at %g", t);
+    }
     if (t < 0.249 || t > 0.251 || in->answer == fmi2OK || in->answer >= AT_THE_END) {
         return fmi2OK;
     }

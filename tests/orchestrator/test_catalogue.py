@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 import subprocess
@@ -120,6 +121,13 @@ KINDS = ("a scenario", "a study file", "a sweep file", "a tuning file", "a vehic
         ("sweep fnn", ["fnn_sideslip/sweep", "fnn_sideslip/sweep_slip_control"]),
         pytest.param("study fnn", ["fnn_sideslip/laws", "fnn_sideslip/study"], marks=pytest.mark.exhaustive),
         ("second", ["second-opinion"]),
+        ("run x --vehicle la", ["large_saloon"]),
+        (
+            "run x --set vehicle.unsprung_mass_",
+            ["vehicle.unsprung_mass_front=", "vehicle.unsprung_mass_rear="],
+        ),
+        ("run x --metric rms_", ["rms_error("]),
+        ("plot x --panel yaw_ra", ["yaw_rate", "yaw_rate_ref"]),
     ],
 )
 def test_the_shell_completes_names(tmp_path, words, completed):
@@ -132,6 +140,30 @@ def test_the_shell_completes_names(tmp_path, words, completed):
     command = [sys.executable, "-c", program]
     done = subprocess.run(command, env=environment, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.stdout.split() == completed, done.stderr
+
+
+def test_files_name_others_by_names_and_every_command_takes_another_car(yawbench, tmp_path):
+    os.chdir(tmp_path)
+    text = (SCENARIOS / "fnn_sideslip/25mps.yaml").read_text()
+    vehicle = next(line for line in text.splitlines() if line.startswith("vehicle:"))
+    Path("mine.yaml").write_text(text.replace(vehicle, "vehicle: suv"))
+    Path("study.yaml").write_text(
+        "title: One\nruns: [{name: a, scenario: fnn_sideslip/25mps}]\n"
+        "metrics: {m: {metric: peak(sideslip)}}\n"
+    )
+    mine, inertia = yb.load("mine.yaml"), {}
+    for car in ("suv", "van"):
+        plan = mine.set({"vehicle": SCENARIOS / f"vehicles/{car}.yaml"}).plan()
+        plant = next(instance for instance in plan.instances if instance.name == "plant")
+        inertia[car] = f"{plant.parameters['yaw_inertia']:g} kg.m2"
+    assert inertia["van"] in yawbench("check", "mine.yaml", "--vehicle", "van")[1]
+    assert inertia["suv"] in yawbench("check", "mine.yaml")[1]
+    assert yawbench("study", "study.yaml", "--set", "stop_time=0.1", "--vehicle", "van", "--out", "s")[0] == 0
+    recorded = json.loads(Path("s/a/run.json").read_text())
+    assert f"{recorded['fmus']['plant']['parameters']['yaw_inertia']:g} kg.m2" == inertia["van"]
+    Path("mine.yaml").write_text(text.replace(vehicle, "vehicle: no_such_car"))
+    status, _, told = yawbench("check", "mine.yaml")
+    assert (status, mentions(told, "mine.yaml:", "no_such_car")) == (2, True)
 
 
 def test_paths_in_a_scenario_are_relative_to_it_wherever_it_is_run_from(yawbench, tmp_path):

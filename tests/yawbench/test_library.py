@@ -682,6 +682,26 @@ def test_what_a_run_cannot_be_evaluated_with_is_said_in_a_sentence(run, test, an
             ("16 GB", "kept", "memory"),
         ),
         (
+            lambda base, run: base.set({"plant.mas": 1200}),
+            yb.ScenarioError,
+            ("set plant.mas=1200", "'mass'"),
+        ),
+        (
+            lambda base, run: base.set({"vehicle.mass": "3 m", "driver.amplitude": "1 kg"}),
+            yb.ScenarioError,
+            ("set driver.amplitude=1 kg", "deg"),
+        ),
+        (
+            lambda base, run: base.set({"inputs.friktion*": 0.3}),
+            yb.ScenarioError,
+            ("set inputs.friktion*=0.3", "'friction_*'"),
+        ),
+        (
+            lambda base, run: base.swap(controller="controller_nowhere"),
+            yb.ModelDescriptionError,
+            ("controller_nowhere",),
+        ),
+        (
             lambda base, run: base.swap(controller=lambda yawrate: 0.0),
             yb.ScenarioError,
             ("'yaw_rate'",),

@@ -42,6 +42,7 @@ from yawbench.reports.viewer import Settings, assets, viewer
 from yawbench.reports.viewer_data import PackedRun, pack
 from yawbench.studies.jobs import LASTING, NEEDED, Job, execute, keyed, planned, recorded
 from yawbench.vocabulary.facts import FACTS
+from yawbench.vocabulary.units import DISPLAYED
 from yawbench.vocabulary.vehicle import CAR
 
 KEPT = 24
@@ -69,11 +70,12 @@ class Knob:
 
     Attributes:
         target: as `--set` takes it.
-        unit: of measurement; "" if it has none.
+        unit: of measurement, degrees and km/h as on figures; "" if it has none.
         value: of the scenario, in that unit.
         low, high: usual range.
         says: what the value is.
         usual: whether the range is that of the vocabulary or the FMU, not just around the value.
+        factor: of a value in SI.
     """
 
     target: str
@@ -83,6 +85,16 @@ class Knob:
     high: float
     says: str
     usual: bool = True
+    factor: float = 1.0
+
+    @classmethod
+    def of_si(
+        cls, target: str, unit: str, numbers: tuple[float, float, float], says: str, usual: bool
+    ) -> Knob:
+        """Return the knob of a value and its range in SI."""
+        shown, factor = DISPLAYED.get(unit, ("" if unit == "1" else unit, 1.0))
+        value, low, high = (float(f"{factor * number:.12g}") for number in numbers)
+        return cls(target, shown, value, low, high, says, usual, factor)
 
     @property
     def step(self) -> float:
@@ -117,8 +129,8 @@ def _facts(scenario: LoadedScenario, plan: Plan) -> Iterator[Knob]:
         if any(True for _ in reached(plan, Target("fact", variable=name))):
             value = float(convert(given.value, fact.unit) if isinstance(given.value, str) else given.value)
             low, high = FACT_RANGES[name]
-            unit = "" if fact.unit == "1" else fact.unit
-            yield Knob(name, unit, value, min(low, value), max(high, value), f"{name} for all instances")
+            numbers = value, min(low, value), max(high, value)
+            yield Knob.of_si(name, fact.unit, numbers, f"{name} for all instances", True)
 
 
 def _knob(target: str, variable: Variable, value: float) -> Knob:
@@ -132,9 +144,8 @@ def _knob(target: str, variable: Variable, value: float) -> Knob:
         low = max(low, variable.minimum)
     if variable.maximum is not None:
         high = min(high, variable.maximum)
-    unit = "" if variable.unit in (None, "1") else str(variable.unit)
-    low, high = min(low, value), max(high, value)
-    return Knob(target, unit, value, low, high, variable.description, plausible is not None)
+    numbers = value, min(low, value), max(high, value)
+    return Knob.of_si(target, variable.unit or "", numbers, variable.description, plausible is not None)
 
 
 def shown_first(knobs: Sequence[Knob], plan: Plan) -> list[str]:

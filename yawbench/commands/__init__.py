@@ -8,6 +8,7 @@ Not here: commands of wings, which stand with their wing.
 _COMMANDS = (
     "new",
     "build",
+    "show",
     "check",
     "run",
     "compare",

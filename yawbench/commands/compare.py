@@ -36,7 +36,7 @@ Swaps = Annotated[
 
 
 @tabular
-@takes("set_", "fault", *MAKING, "jobs", "format_", "fresh")
+@takes("vehicle", "set_", "fault", *MAKING, "jobs", "format_", "fresh")
 def compare(
     context: typer.Context,
     scenario: ScenarioFile,

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from yawbench.commands.judged import judging
 from yawbench.commands.options import CHANGES, MAKING, RunOptions, executor_of, takes
 from yawbench.commands.output import hold, say, stoppable, tabular
 from yawbench.foundation.errors import ResultsError, ScenarioError
@@ -40,12 +41,6 @@ Slow = Annotated[
         help="Scenario of slowly increasing steer, for A; default: proving_ground/slowly_increasing_steer.",
     ),
 ]
-VehicleOption = Annotated[
-    str | None,
-    typer.Option(
-        "--vehicle", metavar="FILE", help="Vehicle file, or a name that `yawbench list vehicles` gives."
-    ),
-]
 StartAngle = Annotated[
     str | None,
     typer.Option(
@@ -58,12 +53,12 @@ DriveFigures = Annotated[bool, typer.Option("--figures", help="Also draw every r
 
 
 @tabular
+@judging
 @takes(*CHANGES, *MAKING, "jobs", "fresh")
 def drive(
     context: typer.Context,
     test: TestToDrive,
     options: RunOptions,
-    vehicle: VehicleOption = None,
     scenario: ScenarioOption = None,
     slow_steer: Slow = None,
     angle: StartAngle = None,
@@ -85,7 +80,7 @@ def drive(
     from yawbench.studies.driven_tests import TestDriver
 
     chosen = DRIVEN[test]
-    changes = (*_vehicle(vehicle), *options.changes)
+    changes = options.changes
     one_run = catalogue.find(scenario or f"{GROUND}/{str(test).replace('-', '_')}", "a scenario")
     folder = options.out or default_folder(one_run, changes, suffix="_series")
     execute = context.with_resource(executor_of(folder, str(one_run), options, format="parquet"))
@@ -129,17 +124,3 @@ def _angle_driven(scenario: Path, changes: Sequence[Override], execute: Executor
         return characteristic_angle(judged)
     except NotJudged as why:
         raise ResultsError(str(why), code="test-not-applicable") from None
-
-
-def _vehicle(name: str | None) -> tuple[Override, ...]:
-    """Return the override of the vehicle file.
-
-    Raises:
-        ScenarioError: the file does not exist.
-    """
-    from yawbench.orchestrator.plan import Override
-    from yawbench.orchestrator.scenario import catalogue
-
-    if name is None:
-        return ()
-    return (Override.of("vehicle", str(catalogue.find(name, "a vehicle file").resolve()), "--vehicle"),)

@@ -12,10 +12,12 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from yawbench.commands import output
+from yawbench.commands.judged import judged as pass_on
+from yawbench.commands.judged import judging
 from yawbench.commands.output import print_tables, say, tabular
 from yawbench.foundation.errors import ResultsError, ScenarioError
 from yawbench.foundation.messages import counted, listed
-from yawbench.metrics.verdict import NotJudged
+from yawbench.metrics.verdict import NotJudged, Status, Verdict
 from yawbench.orchestrator.results.run_record import RUN_FILE
 from yawbench.proving_ground.standard_tests import TESTS, Evaluation, StandardTest, TestSeries
 
@@ -61,6 +63,7 @@ BESIDE = "evaluated"
 
 
 @tabular
+@judging
 def evaluate(
     test: TestToEvaluate,
     sources: EvaluatedSources,
@@ -151,10 +154,25 @@ class EvaluatedRuns:
         courses = [(trace.label, events_of_trace(trace)) for trace in self.traces]
         table.notes += lost_notes(courses, MOST_NOTES, comparable=self.series is None)
         print_tables([table])
+        self._pass_on()
         page = evaluation_page(self.test, self.traces, self.judged, self.series)
         write_whole(self.folder / PAGE, page)
         also = f", {counted(drawn, 'figure')}" if drawn else ""
         say(f"{self.folder / FILE}, {PAGE}{also}")
+
+    def _pass_on(self) -> None:
+        """Pass on the verdicts: of the series, and of every run unless the series is a search among them."""
+        title, series = f"{self.test.name}: {self.folder}", self.series
+        if series and not series.criteria:
+            clean = any(run.verdict is not None and run.verdict.holds for run in self.judged)
+            status = Status.PASSED if clean else Status.FAILED
+            pass_on(title, [("series", Verdict(status, why=series.summary))])
+            return
+        pass_on(
+            title, [(f"series: {name}", one) for name, one in (series.criteria if series else {}).items()]
+        )
+        for run in self.judged:
+            pass_on(title, [(f"{run.label}: {name}", one) for name, one in run.criteria.items()])
 
     def _draw(self, *, each: bool, together: bool) -> int:
         """Draw the runs, next to their results or together, and the series; return the number of figures."""

@@ -14,6 +14,7 @@ from yawbench.commands import output
 from yawbench.foundation.errors import ScenarioError, YawbenchError
 from yawbench.foundation.messages import counted, listed
 
+from .judged import judged_experiment, judging
 from .options import CHANGES, MAKING, RunOptions, executor_of, named, pooled, takes
 from .output import hold, print_tables, say, say_failed, stoppable, tabular
 
@@ -275,6 +276,7 @@ def of_files(context: typer.Context, files: Sequence[Path], options: RunOptions)
         chapters.append(chapter_of(findings, folder, command, each=each))
         pages.append(write_page(chapters[-1], folder))
         conducted.append(data_of(findings, folder))
+        judged_experiment(findings)
         failed = failed or bool(findings.failed) or bool(findings.not_made)
         if len(files) == 1:
             print_tables(all_tables(findings))
@@ -293,6 +295,7 @@ StudyFile = Annotated[
 
 
 @tabular
+@judging
 @takes(*CHANGES, *MAKING, "jobs", "scheduler", "format_", "quick", "fresh", "no_run", "dry_run")
 def study(context: typer.Context, file: StudyFile, options: RunOptions) -> None:
     """Run a study: tables, figures, a verdict per claim.
@@ -311,6 +314,7 @@ SweepFile = Annotated[
 
 
 @tabular
+@judging
 @takes(*CHANGES, *MAKING, "jobs", "scheduler", "keep", "format_", "fresh", "no_run", "dry_run")
 def sweep(context: typer.Context, file: SweepFile, options: RunOptions) -> None:
     """Run a scenario over a grid, list or Latin hypercube.
@@ -329,6 +333,7 @@ Studies = Annotated[
 
 
 @tabular
+@judging
 @takes(*MAKING, "jobs", "format_", "quick", "fresh", "no_run", "dry_run")
 def report(context: typer.Context, options: RunOptions, studies: Studies = None) -> None:
     """Write the pages that reproduce the papers.

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
 
     from yawbench.foundation.errors import Diagnostic
+    from yawbench.orchestrator.master.simulate import Watch
     from yawbench.orchestrator.plan import Plan
     from yawbench.orchestrator.results.run_record import EventRecord
 
@@ -31,14 +32,6 @@ DOTS = np.array([[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]])
 """Dots of a braille character by row and column (Unicode, block 2800 to 28FF)."""
 
 
-class _Watched(Protocol):
-    def look(self, rows: np.ndarray, /) -> None: ...
-
-    def warnings(self) -> tuple[Diagnostic, ...]: ...
-
-    def events(self) -> list[EventRecord] | None: ...
-
-
 class Live:
     """Shows the rows of a run as they are recorded, and passes them on to another observer.
 
@@ -48,7 +41,7 @@ class Live:
         terminal: whether there is a terminal that can redraw.
     """
 
-    def __init__(self, plan: Plan, watch: _Watched, *, terminal: bool) -> None:
+    def __init__(self, plan: Plan, watch: Watch, *, terminal: bool) -> None:
         from yawbench.figures.display import shown_unit, unit_of_signal
         from yawbench.figures.plots import OVERVIEW
         from yawbench.metrics.measures import variable_of, words
@@ -107,6 +100,10 @@ class Live:
     def events(self) -> list[EventRecord] | None:
         """Return the events so far."""
         return self._watch.events()
+
+    def geometry(self) -> dict[str, Any]:
+        """Return where the run takes place."""
+        return self._watch.geometry()
 
     def _show(self) -> None:
         self._drawn = time.monotonic()

@@ -20,6 +20,7 @@ from yawbench.commands.schema import schema_text
 from yawbench.foundation.errors import ScenarioError
 from yawbench.foundation.messages import listed
 
+from .options import completing
 from .output import say
 
 
@@ -233,11 +234,29 @@ Project = Annotated[
 ]
 
 
-def new(kind: NewKindArgument, name: NewName, language: Written = "python", out: Project = None) -> None:
+From = Annotated[
+    str | None,
+    typer.Option(
+        "--from",
+        metavar="SCENARIO",
+        help="Of a scenario: copy this one, a file or a name in scenarios/.",
+        autocompletion=completing("a scenario"),
+    ),
+]
+
+
+def new(
+    kind: NewKindArgument,
+    name: NewName,
+    language: Written = "python",
+    out: Project = None,
+    source: From = None,
+) -> None:
     """Write a working template to start from.
 
     KIND is a component (controller, driver, reference, tyre, plant, road), written with a test and a
-    scenario that uses it; a vehicle with a scenario; a scenario; or a study or sweep of a scenario. The
+    scenario that uses it; a vehicle with a scenario; a scenario, with --from a copy of another, whose files
+    are still found; or a study or sweep of a scenario. The
     commands to run next are printed. In a checkout of yawbench the files go beside its own, where
     `yawbench build` finds them; elsewhere into folders controllers, tests, scenarios and so on. Existing
     files are never overwritten.
@@ -247,12 +266,16 @@ def new(kind: NewKindArgument, name: NewName, language: Written = "python", out:
     check_name(name, role=kind, taken=set(find_recipes()))
     if language == "c" and kind != "controller":
         raise ScenarioError("--language c: only available for controllers", code="name-invalid")
+    if source is not None and kind != "scenario":
+        raise ScenarioError("--from: only available for scenarios", code="option-invalid")
     root = COMPONENTS.parent
     checkout = root if (root / "scenarios").is_dir() else None  # None: installed without them
     here = checkout is not None and Path.cwd().resolve().is_relative_to(checkout)
     folder = out or (checkout if checkout is not None and here else Path())
     in_checkout = folder.resolve() == checkout
     beginning = begin(kind, name, language, in_checkout=in_checkout)
+    if source is not None:
+        beginning = _copy(source, name, folder)
     also = [beginning.source] if beginning.source else []
     write_new(beginning.files, folder, also=also)
     write_schemas(beginning.files, folder)
@@ -261,6 +284,39 @@ def new(kind: NewKindArgument, name: NewName, language: Written = "python", out:
     say("Next:")
     for command in _next(kind, name, beginning, folder, in_checkout):
         print(shlex.join(command))
+
+
+def _copy(source: str, name: str, folder: Path) -> NewFiles:
+    """Return a copy of a scenario, in which the files that it names are still found.
+
+    Raises:
+        ScenarioError: there is no such scenario, or it is no YAML file.
+    """
+    from yawbench.foundation.safe_files import TEXT, read_bytes
+    from yawbench.orchestrator.scenario import catalogue, yaml_lines
+
+    file = catalogue.find(source, "a scenario")
+    if file.suffix not in catalogue.YAML:
+        raise ScenarioError(f"--from {source}: is no scenario file", code="option-invalid")
+    document = yaml_lines.read(file, what="scenario file")
+    document.raise_errors()
+    path = PurePosixPath("scenarios", name, file.name)
+    text = read_bytes(file, largest=TEXT).decode("utf-8-sig")
+    text = re.sub(r"\A# yaml-language-server: .*\n", "", text)
+    for written in sorted({*_texts(document.data)}, key=len, reverse=True):
+        if Path(written).suffix and (found := file.parent / written).is_file():
+            there = Path(os.path.relpath(found.resolve(), (folder / path).parent.resolve())).as_posix()
+            text = re.sub(rf"(?<![\w./-]){re.escape(written)}(?![\w./-])", there.replace("\\", r"\\"), text)
+    schema = f"# yaml-language-server: $schema=../schemas/{_schema_kind(path)}.json\n"
+    return NewFiles({path: schema + text}, path)
+
+
+def _texts(data: Any) -> Iterable[str]:
+    """Yield the texts in the values of a document."""
+    if isinstance(data, str):
+        yield data
+    for inner in data.values() if isinstance(data, dict) else data if isinstance(data, list) else ():
+        yield from _texts(inner)
 
 
 def _next(kind: str, name: str, begun: NewFiles, folder: Path, in_checkout: bool) -> list[list[str]]:

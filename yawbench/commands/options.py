@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import inspect
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -32,12 +32,73 @@ def named(kind: str, **settings: Any) -> Any:
             return [catalogue.find(name, kind) for name in value]
         return value and catalogue.find(value, kind)
 
+    return typer.Argument(callback=find, autocompletion=completing(kind), **settings)
+
+
+def completing(kind: str) -> Callable[[str], list[str]]:
+    """Return what completes the names of a kind of file."""
+
     def complete(incomplete: str) -> list[str]:
         from yawbench.orchestrator.scenario import catalogue
 
-        return [name for name in catalogue.names(kind) if name.startswith(incomplete)]
+        home = f"{catalogue.HOMES.get(kind, '')}/"
+        names = [name.removeprefix(home) for name in catalogue.names(kind)]
+        return [name for name in names if name.startswith(incomplete)]
 
-    return typer.Argument(callback=find, autocompletion=complete, **settings)
+    return complete
+
+
+def completing_names(*of: str) -> Callable[[str], list[str]]:
+    """Return what completes names of the vocabulary: `facts`, `quantities`, `signals` or `metrics`."""
+
+    def complete(incomplete: str) -> list[str]:
+        from yawbench.orchestrator.signal_names import OF_RUN, VEHICLE
+        from yawbench.vocabulary.facts import FACTS
+        from yawbench.vocabulary.signals import SIGNALS
+        from yawbench.vocabulary.vehicle import CAR
+
+        names: list[str] = []
+        names += [f"{name}=" for name in (*FACTS, *OF_RUN)] if "facts" in of else []
+        names += [f"{VEHICLE}.{name}=" for name in CAR] if "quantities" in of else []
+        names += [*SIGNALS, "path"] if "signals" in of else []
+        if "metrics" in of:
+            from yawbench.metrics.measures import catalogue as measures
+
+            names += ["standard", *(f"{measure.name}(" for measure in measures())]
+        return [name for name in names if name.startswith(incomplete)]
+
+    return complete
+
+
+def _refuse_of_car(settings: Iterable[str]) -> None:
+    """Refuse quantities of the car without the word before them, as `mass` of `vehicle.mass`.
+
+    Raises:
+        ScenarioError: with the names that are meant.
+    """
+    from yawbench.vocabulary.vehicle import CAR
+
+    errors = []
+    for text in settings:
+        name, equals, value = (part.strip() for part in text.partition("="))
+        if equals and name in CAR:
+            errors.append(f"--set {text}: did you mean vehicle.{name}={value}, or INSTANCE.{name}={value}?")
+    if errors:
+        raise ScenarioError(errors, code="option-invalid")
+
+
+def _of_vehicle(name: str | None) -> tuple[Override, ...]:
+    """Return the override of the vehicle file.
+
+    Raises:
+        ScenarioError: the file does not exist.
+    """
+    from yawbench.orchestrator.plan import Override
+    from yawbench.orchestrator.scenario import catalogue
+
+    if name is None:
+        return ()
+    return (Override.of("vehicle", str(catalogue.find(name, "a vehicle file").resolve()), "--vehicle"),)
 
 
 ScenarioFile = Annotated[
@@ -58,6 +119,15 @@ class RunOptions:
         ScenarioError: two options contradict each other, or one is malformed.
     """
 
+    vehicle: Annotated[
+        str | None,
+        typer.Option(
+            "--vehicle",
+            metavar="FILE",
+            help="Vehicle file in place of the scenario's, or a name that `yawbench list vehicles` gives.",
+            autocompletion=completing("a vehicle file"),
+        ),
+    ] = None
     swap: Annotated[
         list[str] | None,
         typer.Option(
@@ -71,6 +141,7 @@ class RunOptions:
         typer.Option(
             "--set",
             metavar="INSTANCE.PARAMETER=VALUE",
+            autocompletion=completing_names("facts", "quantities"),
             help="Set a parameter of an instance; also vehicle.NAME, inputs.NAME, INSTANCE.step_size, "
             "INSTANCE.validate, start_time, stop_time, step_size, algorithm. Repeatable.",
         ),
@@ -194,12 +265,14 @@ class RunOptions:
         """The overrides for all runs."""
         from yawbench.orchestrator.scenario.overrides import read_changes
 
-        return read_changes(self.swap or (), self.set_ or (), self.fault or ())
+        _refuse_of_car(self.set_ or ())
+        return (*_of_vehicle(self.vehicle), *read_changes(self.swap or (), self.set_ or (), self.fault or ()))
 
     @property
     def changing(self) -> dict[str, Any]:
         """The options that change all runs, as they were given."""
-        return {"swap": self.swap, "set": self.set_, "fault": self.fault}
+        vehicle = None if self.vehicle is None else [self.vehicle]
+        return {"vehicle": vehicle, "swap": self.swap, "set": self.set_, "fault": self.fault}
 
     @functools.cached_property
     def limit(self) -> float | None:
@@ -248,7 +321,7 @@ def takes(*names: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
     return taking
 
 
-CHANGES = ("swap", "set_", "fault")
+CHANGES = ("vehicle", "swap", "set_", "fault")
 """Options of commands that change a scenario."""
 MAKING = ("out", "fmus", "no_build", "isolate", "call_limit")
 """Options of commands that make runs."""
@@ -264,9 +337,12 @@ def plan_of_scenario(scenario: Path, options: RunOptions, record: Sequence[str] 
     """
     from yawbench.planner import Planner
 
+    from .output import BUILDING, announced
+
     planner = Planner(build=options.build)
     loaded = planner.load(scenario, options.changes, validate=not options.no_validate)
-    return planner.plan(loaded, fmus=options.fmus, isolated=options.isolate, record=record)
+    with announced(BUILDING):
+        return planner.plan(loaded, fmus=options.fmus, isolated=options.isolate, record=record)
 
 
 def pooled(context: typer.Context, options: RunOptions) -> Each:

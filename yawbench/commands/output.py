@@ -102,7 +102,7 @@ def printing(arguments: Sequence[str]) -> Iterator[Output]:
     """Collect the output of a command line in the form that it asks for; help is text."""
     own = [*arguments[: arguments.index("--")]] if "--" in arguments else [*arguments]
     wanted: Form = "json" if "--json" in own else "latex" if "--latex" in own else "text"
-    if wanted == "text" or "--help" in own:
+    if wanted == "text" or {"-h", "--help"} & {*own}:
         yield Output()
         return
     output = Output(wanted, own[0])
@@ -238,6 +238,24 @@ class _Log:
 _LOG = _Log()
 
 
+PATIENCE = 2.0
+"""Time [s] after which a command says what it is at. Chosen: readers of a terminal take more for a hang."""
+BUILDING = "opening the FMUs, and building those that are missing or whose sources have changed: seconds each"
+
+
+@contextlib.contextmanager
+def announced(text: str) -> Iterator[None]:
+    """Print a line if the block takes longer than `PATIENCE`."""
+    timer = threading.Timer(PATIENCE, say, [text])
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
+        timer.join()
+
+
 def say(text: str) -> None:
     """Print a message for the user on stderr, apart from the command's output."""
     _LOG.say(text)
@@ -282,9 +300,11 @@ class Terminal:
     making: bool = True  # whether missing runs are made
     noted: set[str] = field(default_factory=set)
 
-    def planning(self, total: int) -> contextlib.AbstractContextManager[Callable[[int], None]]:
-        """Show a bar."""
-        return bar("planning", total, quiet=True)
+    @contextlib.contextmanager
+    def planning(self, total: int) -> Iterator[Callable[[int], None]]:
+        """Show a bar, and say if FMUs are what takes long."""
+        with announced(BUILDING), bar("planning", total, quiet=True) as progress:
+            yield progress
 
     def planned(self, planned: PlannedExperiment) -> None:
         """Print which FMUs are out of date."""

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 import typer
 
 from yawbench.commands.animate import write_view
-from yawbench.commands.options import CHANGES, MAKING, RunOptions, takes
+from yawbench.commands.options import CHANGES, MAKING, RunOptions, completing_names, takes
 from yawbench.commands.output import say
 from yawbench.commands.recorded_runs import (
     Labels,
@@ -32,6 +32,7 @@ Panels = Annotated[
     typer.Option(
         "--panel",
         metavar="NAME",
+        autocompletion=completing_names("signals"),
         help="A signal (yaw_rate, plant.roll_angle, wheel_torque_*), its error (sideslip_error), one over "
         "another (yaw_rate(sideslip)) or path; repeatable. Default: the figures of the papers.",
     ),
@@ -128,7 +129,7 @@ def plot(
 
     from yawbench.figures.display import LabelledRun
     from yawbench.figures.panels import check_panels
-    from yawbench.figures.plots import OVERVIEW, draw, shown_by, size_of_style
+    from yawbench.figures.plots import draw, overview_of, shown_by, size_of_style
     from yawbench.figures.style import KINDS, save
     from yawbench.studies.comparison import FIGURES
 
@@ -148,9 +149,9 @@ def plot(
         for name, results in zip(labels, read_runs(folders, start, thin=True), strict=True)
     ]
     check_panels(runs, panel or ())
-    figures: dict[str, Sequence[str]] = {"overview": panel or OVERVIEW}
+    figures: dict[str, Sequence[str]] = {"overview": panel or overview_of(runs)}
     if file:
-        figures = {file.stem: panel or OVERVIEW}
+        figures = {file.stem: panel or overview_of(runs)}
     elif len(runs) > 1 and not panel:
         figures = {name: panels for name, panels in FIGURES.items() if shown_by(runs, panels)}
     for name, panels in figures.items():

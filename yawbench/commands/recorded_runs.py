@@ -49,7 +49,8 @@ def recorded(sources: Sequence[Path], options: RunOptions) -> list[Path]:
     from yawbench.studies.jobs import Job, execute, ready
 
     sources = [path if os.path.exists(path) else catalogue.named(path) or path for path in sources]
-    files = [path for path in sources if path.suffix in catalogue.ENDINGS and not os.path.isdir(path)]
+    endings = (*catalogue.ENDINGS, catalogue.FMU)
+    files = [path for path in sources if path.suffix in endings and not os.path.isdir(path)]
     scenarios = [path for path in files if catalogue.kind_of(path) != MEASUREMENT]
     if options.changes and not scenarios:
         raise ScenarioError(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import textwrap
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, Annotated
@@ -13,10 +14,11 @@ from yawbench.commands import output
 from yawbench.foundation.errors import Diagnostic, ScenarioError, SimulationError, warnings_in
 from yawbench.foundation.messages import printable
 
-from .options import CHANGES, MAKING, RunOptions, ScenarioFile, plan_of_scenario, takes
+from .options import CHANGES, MAKING, RunOptions, ScenarioFile, completing_names, plan_of_scenario, takes
 from .output import print_tables, say, shows_bars, tabular
 
 if TYPE_CHECKING:
+    from yawbench.orchestrator.master.log import Message
     from yawbench.orchestrator.master.simulate import Watch
     from yawbench.orchestrator.plan import Plan
     from yawbench.orchestrator.results.run_record import EventRecord
@@ -27,6 +29,7 @@ MetricsOption = Annotated[
     typer.Option(
         "--metric",
         metavar="NAME",
+        autocompletion=completing_names("metrics"),
         help="Metric to print, such as 'peak(sideslip)' or 'peak(sideslip) from 1 s to 3 s'; "
         "'standard' prints the standard metrics. Repeatable.",
     ),
@@ -56,6 +59,15 @@ PaceOption = Annotated[
         "--realtime", metavar="FACTOR", help="Simulated seconds per second: 1 is real time, 0.2 slow motion."
     ),
 ]
+LogOption = Annotated[
+    str | None,
+    typer.Option(
+        "--log",
+        metavar="LEVEL[:CATEGORY]",
+        help="Show the messages of the FMUs as they arrive: error, warning or info and worse, all or of "
+        "categories ('info:logEvents,logStatusWarning'; `yawbench show` lists them).",
+    ),
+]
 
 SHOWN = 5
 """Number of warnings shown; all are in run.json."""
@@ -75,8 +87,9 @@ def run(
     record: RecordOption = None,
     live: LiveOption = False,
     realtime: PaceOption = None,
+    log: LogOption = None,
 ) -> None:
-    """Run a scenario and write results.csv and run.json.
+    """Run a scenario, or an FMU alone, and write results.csv and run.json.
 
     Without --out and --name, results go to results/<folder of the scenario>/<its name>, with the overrides
     appended to the name. They replace those of an earlier run, but a failed run never replaces a
@@ -117,6 +130,7 @@ def run(
     try:
         with (
             _seen(plan, live) as watch,
+            _listening(log) as hear,
             _bar(title, wanted=not live) as progress,
             opener_of(plan, options.limit) as opener,
         ):
@@ -129,15 +143,16 @@ def run(
                 format=options.format_,
                 apart=True,
                 pace=realtime,
+                hear=hear,
             )
     except SimulationError as error:
         _say_warnings(error.warnings)
         raise
-    for message in info.warnings[:SHOWN]:
+    for message in info.warnings[:SHOWN] if log is None else ():
         grade = "" if message.status == WARNING else f"{STATUS[message.status]}: "
         text = " ".join(message.text.split())
         say(f"warning: {message.instance} at t = {message.time:.9g} s: {grade}{text}")
-    if len(info.warnings) > SHOWN:
+    if log is None and len(info.warnings) > SHOWN:
         say(f"warning: {len(info.warnings) - SHOWN} more, see {folder / 'run.json'}")
     if info.ended:
         say(f"ended: {info.ended}")
@@ -158,6 +173,42 @@ def run(
         output.answer(
             metrics={name: {"value": value.number, "unit": value.unit} for name, value in numbers.items()}
         )
+
+
+@contextlib.contextmanager
+def _listening(wanted: str | None) -> Iterator[Callable[[Message], None] | None]:
+    """Yield what prints the messages of the level and the categories of `--log`, None without it.
+
+    Raises:
+        ScenarioError: there is no such level.
+    """
+    from yawbench.orchestrator.master import log
+
+    if wanted is None:
+        yield None
+        return
+    levels = {"error": log.DISCARD, "warning": log.WARNING, "info": log.OK}
+    level, _, names = wanted.partition(":")
+    if level not in levels:
+        raise ScenarioError(
+            f"--log {wanted}: the level is error, warning or info, perhaps with categories: info:logEvents",
+            code="option-invalid",
+        )
+    categories = {name.strip() for name in names.split(",") if name.strip()}
+
+    def hear(message: Message) -> None:
+        if message.status >= levels[level] and (not categories or message.category in categories):
+            category = f" [{message.category}]" if message.category else ""
+            where = f"{message.instance} at t = {message.time:.9g} s{category}"
+            say(f"{log.STATUS[message.status]}: {where}: {' '.join(message.text.split())}")
+
+    before = os.environ.get(log.EVERYTHING)
+    os.environ[log.EVERYTHING] = level
+    try:
+        yield hear
+    finally:
+        os.environ.pop(log.EVERYTHING)
+        os.environ |= {} if before is None else {log.EVERYTHING: before}
 
 
 def _say_why(events: Sequence[EventRecord]) -> None:

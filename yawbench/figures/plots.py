@@ -13,6 +13,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from yawbench.foundation.errors import ResultsError
+from yawbench.foundation.messages import fold
 from yawbench.orchestrator.plan import Override
 from yawbench.orchestrator.recordings.gaps import gaps_noted
 from yawbench.orchestrator.results.run_record import RunStatus
@@ -48,6 +49,8 @@ OVERVIEW = (
     "path",
 )
 """The panels of the figures in the papers."""
+MOST_PANELS = 12
+"""Panels of a figure of runs that recorded none of these signals. Chosen: one page."""
 FAULTY = "#F7DDC8"
 """Colour of fault spans; pale enough for all lines and the grid."""
 SPAN: dict[str, Any] = {"color": FAULTY, "linewidth": 8.0, "linestyle": "-", "solid_capstyle": "butt"}
@@ -182,6 +185,14 @@ def nothing_recorded(run: LabelledRun) -> str:
     error = run.results.record.error
     why = f": {' '.join(error.message.split())}" if error and error.message else ""
     return f"{run.results.folder}: nothing to draw, this run ended at its start{why}."
+
+
+def overview_of(runs: Sequence[LabelledRun]) -> Sequence[str]:
+    """Return the panels of the papers, or of runs without a car the first signals that they recorded."""
+    if shown_by(runs, OVERVIEW):
+        return OVERVIEW
+    signals = fold(list(dict.fromkeys(name.variable for run in runs for name in run.results.names.values())))
+    return signals[:MOST_PANELS] or OVERVIEW
 
 
 def rows_of(panels: Sequence[Panel], width: float) -> list[list[Panel]]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from yawbench.commands import output
+from yawbench.commands.judged import judged, judging
 from yawbench.commands.options import CHANGES, MAKING, RunOptions, takes
 from yawbench.commands.output import hold, print_tables, say, stoppable, tabular
 from yawbench.foundation.errors import ScenarioError
@@ -244,6 +245,7 @@ def vehicle_text(result: FitResult, folder: Path, planner: Planner) -> str:
 
 
 @tabular
+@judging
 @takes(*CHANGES, *MAKING)
 def validate(
     scenario: Validated,
@@ -282,6 +284,7 @@ def validate(
     output.answer(folder=out, validation=validation.as_data())
     notes = tuple(dict.fromkeys((*measurement.notes, *validation.diagnostics)))
     output.note(notes)
+    judged(f"{validation.title}, against {validation.measured}", validation.verdicts.items())
     print_tables([validation_table(validation), conditions_table(validation)])
     for diagnostic in notes:
         say(f"{'note' if diagnostic.severity == 'info' else 'warning'}: {diagnostic}")

@@ -9,17 +9,20 @@ import typer
 
 from yawbench.commands import output
 from yawbench.commands.experiments import command_of, print_forecasts
+from yawbench.commands.judged import broken_off, judged, judging
 from yawbench.commands.options import MAKING, RunOptions, executor_of, named, pooled, takes
 from yawbench.commands.output import hold, print_tables, say, stoppable, tabular
 from yawbench.foundation.errors import ResultsError, ScenarioError
-from yawbench.foundation.messages import hint
+from yawbench.foundation.messages import counted, hint
+from yawbench.metrics.verdict import Status, Verdict
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
     from yawbench.studies.experiment_result import Each
 
     from .ranking import EntrySpec
+    from .ranking_scores import EntryScore
     from .whole import WholeRanking
 
 RankingFile = Annotated[
@@ -53,6 +56,7 @@ Quick = Annotated[
 
 
 @tabular
+@judging
 @takes(*MAKING, "jobs", "scheduler", "fresh", "no_run", "dry_run")
 def rank(
     context: typer.Context,
@@ -104,11 +108,23 @@ def rank(
         command = command_of("rank", file, quick=quick, controller=controller, condition=condition)
         _write(ranked, folder, command, pooled(context, options))
     output.answer(folder=folder, page=folder / PAGE, entries=records_in(columns_of_entries(ranked)))
+    _pass_on(score for score in ranked.scores if not only or score.entry in only)
     table = table_of(ranked, "gains", "speed lost", "chatter")
     table.notes += lost_cells(ranked)
     print_tables([table, *beside_matrix(ranked)])
     if unranked := [score.entry for score in ranked.scores if score.missing]:
         say(f"not ranked (missing runs): {', '.join(unranked)}")
+
+
+def _pass_on(scores: Iterable[EntryScore]) -> None:
+    """Pass on which conditions the entries pass."""
+    for score in scores:
+        for cell in score.cells.values():
+            if cell.missing:
+                broken_off(score.spec.title, [(cell.condition, counted(cell.missing, "missing run"))])
+                continue
+            status = Status.PASSED if cell.passed else Status.FAILED
+            judged(score.spec.title, [(cell.condition, Verdict(status, why=cell.state.value))])
 
 
 def _check(option: str, what: str, names: Sequence[str], known: Mapping[str, Any]) -> None:

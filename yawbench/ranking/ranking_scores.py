@@ -391,7 +391,7 @@ def run_ranking(
     result = execute(
         dwell,
         only=lambda case: not only or case.point[0].value in only,
-        keep=False,
+        keep=keep and ranking.quick,  # one run a cell: which are worth keeping is known before
         record=RECORDED,
         timed=CONTROLLER,
     )

@@ -50,6 +50,7 @@ LONGEST = 100
 _FOLDER = re.compile(rf"[\w.+-]{{1,{LONGEST}}}")
 Texts = TypeVar("Texts", Claim, DerivedSpec)
 SCENARIOS = Path("scenarios")
+SCENARIO = "a scenario"
 """Folder searched for studies if none is given."""
 
 
@@ -87,7 +88,11 @@ def load_experiment(path: Path | str, *, changes: Sequence[Override] = ()) -> Lo
     document = yaml_lines.read(path, what="experiment file")
     spec = validated(ExperimentFile, document)
     spec = with_tables(expanded(spec, document), document)
-    runs = {"": NamedRun("", "", "", path.parent / spec.scenario, ())} if spec.scenario else {}
+    runs = (
+        {"": NamedRun("", "", "", catalogue.beside(path, spec.scenario, SCENARIO), ())}
+        if spec.scenario
+        else {}
+    )
     for i, entry in enumerate(spec.runs):
         for run in named_runs(document, i, entry):
             if len(runs) == MOST:
@@ -221,7 +226,7 @@ def named_runs(document: Document, i: int, entry: RunSpec) -> Iterator[NamedRun]
                 changes[change.target] = change
         label = binding.fill(entry.label, "label", sentence=True) or name
         row = binding.fill(entry.row, "row", sentence=True) or label
-        scenario = folder / binding.fill(entry.scenario, "scenario")
+        scenario = catalogue.beside(document.path, binding.fill(entry.scenario, "scenario"), SCENARIO)
         if len(document.errors) > known:
             return
         yield NamedRun(name, label, row, scenario, tuple(changes.values()))

@@ -37,6 +37,7 @@ from .derivations import (
     contradictions,
     quantity_of,
 )
+from .load import LOAD, load_of, loaded
 from .quantities import BODY, CAR
 from .suspicious_values import suspicious_values
 
@@ -68,7 +69,7 @@ def _measured(path: Path) -> Measurement:
 class CarParameters(Parameters):
     """The parameters of all instances, with those that follow from the car's and from tyre property files."""
 
-    known = CAR
+    known = (*CAR, LOAD)
     written: ClassVar = {"patches": patches_of, "friction_table": table_of}
 
     def __init__(self, system: WiringContext, measure: TyreMeasurement | None = None) -> None:
@@ -128,7 +129,7 @@ class CarParameters(Parameters):
             except ValueError as error:  # noqa: PERF203 - all are told
                 if name in idle:  # else it is reported already
                     self.system.report(self._of_car[name].where, str(error), code_of(error))
-        numbers = self._adapted(numbers)
+        numbers = self._with_load(self._adapted(numbers))
         for name, sentence in contradictions(numbers):
             where = self._of_car[name].where if name in self._of_car else self._where
             self.system.report(where, sentence, "vehicle-contradictory")
@@ -141,6 +142,32 @@ class CarParameters(Parameters):
             if name not in self._car.used and name not in BODY and self._of_car[name].changed:
                 sentence = f"vehicle.{name} changes nothing: no instance takes it or what follows"
                 self.system.note("value-unused", sentence)
+
+    def _with_load(self, numbers: dict[str, float]) -> dict[str, float]:
+        """Return the vehicle file's quantities with its load, if it has one; note what it makes of them."""
+        if (given := self._of_car.get(LOAD)) is None:
+            return numbers
+        try:
+            load = load_of(given.value)
+            after = loaded(numbers, load)
+        except ValueError as error:
+            self.system.report(given.where, str(error), code_of(error))
+            return numbers
+        changed = [name for name, value in after.items() if value != numbers.get(name)]
+        for name in changed:
+            origin = ValueOrigin.derived(f"with a load of {load}")
+            for instance in self.takers(name):
+                self.give(instance, name, Given(after[name], origin, self._where), f"{name}: ")
+        before, now = car_of(numbers).values, car_of(after).values
+        words = [
+            f"{name} {now[name]:.6g} {CAR[name].unit} ({before[name]:.6g} before)"
+            for name in ("mass", "cg_to_front_axle", "cg_height", "yaw_inertia")
+            if name in now and name in before
+        ]
+        self.system.note(
+            "quantity-follows", f"vehicle.load = {load}: {listed(words)}; the wheels stay as they are"
+        )
+        return after
 
     def _adapted(self, given: Mapping[str, float]) -> dict[str, float]:
         """Return the vehicle file's quantities after changes, with those that follow; note them."""

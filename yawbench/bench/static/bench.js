@@ -40,7 +40,9 @@ class Bench {
     this.values = new Map(this.facts.shown.map((target) => [target, this.facts.knobs[target].value]));
     for (const text of words.getAll('set')) {
       const [target, value] = text.split('=');
-      if (target in this.facts.knobs && Number.isFinite(Number(value))) this.values.set(target, Number(value));
+      if (!(target in this.facts.knobs) || !Number.isFinite(parseFloat(value))) continue;
+      const {factor} = this.facts.knobs[target]; // without a unit it is in SI
+      this.values.set(target, parseFloat(value) * (Number.isFinite(Number(value)) ? factor : 1));
     }
     for (const text of words.getAll('swap')) {
       const [instance, fmu] = text.split('=');
@@ -63,7 +65,7 @@ class Bench {
     const swaps = [...this.form.querySelectorAll('.swap')].filter((one) => !one.selectedOptions[0].defaultSelected);
     const fault = this.find('fault').value.trim();
     return {
-      settings: [...this.values].filter(([target, value]) => value !== knobs[target].value).map(([target, value]) => `${target}=${value}`),
+      settings: [...this.values].filter(([target, value]) => value !== knobs[target].value).map(([target, value]) => `${target}=${value}${knobs[target].factor === 1 ? '' : ` ${knobs[target].unit}`}`),
       swaps: swaps.map((one) => `${one.dataset.instance}=${one.value}`),
       faults: /:\s*\S/.test(fault) ? [fault] : [],
     };

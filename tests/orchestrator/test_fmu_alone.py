@@ -1,0 +1,147 @@
+"""An FMU of anybody is shown, checked, run alone and drawn; what it says is heard."""
+
+from __future__ import annotations
+
+import sys
+import zipfile
+
+import pytest
+
+from tests.command_line import status_of
+from tests.orchestrator.test_foreign import mostly_together, write_fmu
+from tests.refusals import mentions
+from yawbench.orchestrator.results.reader import load_results
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="compiles for Linux")
+EXPERIMENT = '<DefaultExperiment startTime="1" stopTime="3" stepSize="0.25"/><ModelVariables>'
+
+
+@pytest.fixture
+def alone(library, tmp_path, capsys, monkeypatch):
+    """Write an FMU and call a command with it; return the status and all that was printed."""
+    monkeypatch.chdir(tmp_path)
+
+    def call(*command, experiment=EXPERIMENT, kinds=("Real", "Integer"), guid="{good}"):
+        write_fmu(
+            tmp_path / "other.fmu", library, *kinds, guid=guid,
+            change=lambda xml: xml.replace("<ModelVariables>", experiment),
+        )  # fmt: skip
+        first, *rest = command
+        status = status_of(first, "other.fmu", *rest)
+        printed = capsys.readouterr()
+        return status, printed.out, printed.err
+
+    return call
+
+
+def test_it_runs_over_its_default_experiment_with_its_start_values(alone, tmp_path):
+    status, _, said = alone("run", "--out", "out")
+    assert status == 0, said
+    results = load_results(tmp_path / "out")
+    assert results.time.tolist() == [1.0 + 0.25 * k for k in range(9)]
+    constants = results.record.fmus["other"].constants
+    assert set(results["other.Real_out"]) == {2.0 * float(constants["Real_in"])}
+    assert set(results["other.Integer_out"]) == {2 * int(constants["Integer_in"])}
+
+
+def test_options_change_it_as_a_scenario(alone, tmp_path):
+    setting = ("--set", "inputs.Real_in=0.5", "--set", "stop_time=1.5")
+    status, _, said = alone("run", "--out", "out", *setting)
+    assert status == 0, said
+    results = load_results(tmp_path / "out")
+    assert (results.time[-1], results["other.Real_out"][-1]) == (1.5, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("stated", "step"), [('stopTime="3"', 0.006), ('stopTime="3" stepSize="0.7"', 0.7), ("", None)]
+)
+def test_what_the_default_experiment_leaves_open(alone, tmp_path, stated, step):
+    status, _, said = alone(
+        "run", "--out", "out", experiment=f"<DefaultExperiment {stated}/><ModelVariables>"
+    )
+    if step is None:
+        assert status == 2
+        assert mentions(said, "other.fmu", "--set stop_time=")
+        assert mentions(said, "other.fmu", "--set step_size=")
+        return
+    assert status == 0, said
+    assert load_results(tmp_path / "out").time[1] == step
+    assert load_results(tmp_path / "out").time[-1] == round(3 / step) * step
+
+
+def test_it_is_checked_and_drawn(alone, tmp_path):
+    status, out, said = alone("check")
+    assert status == 0, said
+    assert mentions(out, "2 s", "8 steps", "250 ms")
+    status, _, said = alone("plot")
+    assert status == 0, said
+    assert [*(tmp_path / "results").glob("**/overview.svg")]
+
+
+def test_show_tells_variables_and_times(alone):
+    status, out, _ = alone("show")
+    assert status == 0
+    for line in (("Real_in", "input", "Real"), ("Integer_out", "output", "Integer"), ("answer", "0 to 4")):
+        assert mentions(out, *line)
+    assert mentions(out, "stop time", "3 s")
+    assert "Wired" not in out
+
+
+def test_show_says_why_an_fmu_cannot_run_here(library, tmp_path, capsys):
+    path = write_fmu(tmp_path / "other.fmu", library, "Real")
+    with zipfile.ZipFile(path) as archive:
+        description = archive.read("modelDescription.xml").decode()
+    wired = description.replace('name="Real_in"', 'name="steer_angle"').replace(
+        "<Real start", '<Real unit="deg" start'
+    )
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("modelDescription.xml", wired.replace('"Real_out"', '"YawRateOut"'))
+        archive.write(library, "binaries/win64/foreign.dll")
+    assert status_of("show", path) == 0
+    out = capsys.readouterr().out
+    assert mentions(out, "note", "binaries/linux64/foreign.so", "win64")
+    assert mentions(out, "steer_angle", "input", "driver")
+    assert status_of("show", tmp_path / "none.fmu") == 2
+    (tmp_path / "text.fmu").write_text("no archive")
+    assert status_of("show", tmp_path / "text.fmu") == 2
+
+
+def test_an_unconnected_input_of_a_foreign_fmu_keeps_its_start_value_and_a_note_says_so(
+    library, tmp_path, monkeypatch, capsys
+):
+    monkeypatch.chdir(tmp_path)
+    write_fmu(
+        tmp_path / "other.fmu",
+        library,
+        "Real",
+        change=lambda xml: xml.replace('<Real start="0"', '<Real start="0.75"'),
+    )
+    scenario = "title: One\nstop_time: 1\nstep_size: 0.5\nunits: {a: {fmu: ./other.fmu}}\n"
+    (tmp_path / "one.yaml").write_text(scenario)
+    assert status_of("run", "one.yaml", "--out", "out") == 0
+    assert mentions(capsys.readouterr().err, "note", "a", "Real_in = 0.75", "start value")
+    assert set(load_results(tmp_path / "out")["a.Real_out"]) == {1.5}
+
+
+def test_an_input_that_an_output_resembles_is_an_error_as_before(library, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    write_fmu(tmp_path / "a.fmu", library, "Real", change=lambda xml: xml.replace("Real_out", "yaw_rate"))
+    write_fmu(tmp_path / "b.fmu", library, "Real", change=lambda xml: xml.replace("Real_in", "YawRate"))
+    scenario = "title: Two\nstop_time: 1\nstep_size: 0.5\nunits: {a: {fmu: ./a.fmu}, b: {fmu: ./b.fmu}}\n"
+    (tmp_path / "two.yaml").write_text(scenario)
+    assert status_of("run", "two.yaml", "--out", "out") == 2
+    assert mentions(capsys.readouterr().err, "b.YawRate", "a.yaw_rate")
+
+
+@mostly_together
+def test_log_shows_levels_and_categories(alone, isolate):
+    status, _, said = alone("run", "--out", "o", "--log", "info", *isolate, guid="{chatty}")
+    assert status == 0, said
+    assert said.count("OK: other at t = ") == 8
+    assert mentions(said, "t = 1.25 s", "[steps]", "at 1.25")
+    assert "OK:" not in alone("run", "--out", "o", "--log", "warning", *isolate, guid="{chatty}")[2]
+    assert "OK:" not in alone("run", "--out", "o", "--log", "info:other", *isolate, guid="{chatty}")[2]
+    assert "OK:" in alone("run", "--out", "o", "--log", "info:steps", *isolate, guid="{chatty}")[2]
+    status, _, said = alone("run", "--out", "o", "--log", "loud")
+    assert status == 2
+    assert mentions(said, "--log loud", "error", "warning", "info")
