@@ -64,7 +64,7 @@ def run(
 
     if options.out and name:
         raise ScenarioError("--out and --name are mutually exclusive", code="option-invalid")
-    metrics = _metric_names(metric or ())
+    metrics = metric_names(metric or ())
     plan = plan_of_scenario(scenario, options)
     output.note(plan.diagnostics)
     if named := [name for name in metric or () if name != "standard"]:
@@ -139,7 +139,7 @@ def _say_warnings(diagnostics: Iterable[Diagnostic]) -> None:
         say(f"note: {warning}")
 
 
-def _metric_names(texts: Sequence[str]) -> list[str]:
+def metric_names(texts: Sequence[str]) -> list[str]:
     """Return the metrics given by `--metric`, each once."""
     if not texts:
         return []
