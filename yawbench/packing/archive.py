@@ -166,13 +166,22 @@ def _texts(pack: Pack, study: PurePosixPath, name: str) -> Mapping[str, str]:
         "command": shlex.join([*command, "--fmus", FMUS, "--no-build", "--fresh", "--out", "repeated"]),
         "runs": len(pack.planned.jobs),
         "versions": versions(),
-        "fmus": sorted((fmu.name, digest) for digest, fmu in pack.planned.fmus.items()),
+        "fmus": sorted((fmu.name, digest, _source_in(fmu.path)) for digest, fmu in pack.planned.fmus.items()),
     }
     loader = PackageLoader("yawbench.packing")
     environment = Environment(
         loader=loader, undefined=StrictUndefined, keep_trailing_newline=True, trim_blocks=True
     )
     return {text: environment.get_template(f"{text}.j2").render(facts) for text in TEXTS}
+
+
+def _source_in(archive: Path) -> str:
+    """Return in which folder an FMU has its source, "none" if it has none."""
+    with zipfile.ZipFile(archive) as members:
+        names = members.namelist()
+    if any(name.startswith("resources/") and name.endswith(".py") for name in names):
+        return "`resources/` (Python)"
+    return "`sources/` (C)" if any(name.startswith("sources/") for name in names) else "none"
 
 
 def _prove(pack: Pack, root: Path, study: PurePosixPath) -> None:

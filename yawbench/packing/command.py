@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from yawbench.commands import output
-from yawbench.commands.experiments import StudyFile, conduct
+from yawbench.commands.experiments import StudyFile, chapter_of, command_of, conduct, write_page
 from yawbench.commands.options import RunOptions, pooled, takes
 from yawbench.commands.output import hold, say
 from yawbench.foundation.errors import ScenarioError
@@ -46,9 +46,14 @@ def pack(context: typer.Context, file: StudyFile, options: RunOptions, out: Arch
     with noting_files() as read:
         experiment = load_experiment(file)
         hold(context, folder)
-        findings = conduct(experiment, folder, options, pooled(context, options))
+        each = pooled(context, options)
+        findings = conduct(experiment, folder, options, each)
+        kind = "study" if experiment.spec.runs else "sweep"
+        command = command_of(kind, experiment.path, quick=options.quick)
+        write_page(chapter_of(findings, folder, command, each=each), folder)
     planned = findings.planned
     assert planned is not None
+    say(f"packing {archive}")
     counts = write_archive(Pack(planned, folder, read, options.fmus, options.quick), archive)
     say(
         f"{archive}: {counted(counts['scenarios'], 'file')}, {counted(counts.get('fmus', 0), 'FMU')}, "

@@ -77,14 +77,16 @@ def lock() -> dict[str, str]:
 
 def _needed(package: str, known: set[str]) -> Iterator[tuple[str, str]]:
     from packaging.requirements import Requirement  # a package that matplotlib brings
+    from packaging.utils import canonicalize_name
 
     for text in distribution(package).requires or ():
         needed = Requirement(text)
-        if needed.name.lower() in known or (needed.marker and not needed.marker.evaluate({"extra": ""})):
+        name = canonicalize_name(needed.name)
+        if name in known or (needed.marker and not needed.marker.evaluate({"extra": ""})):
             continue
-        known.add(needed.name.lower())
+        known.add(name)
         try:
-            yield needed.name, distribution(needed.name).version
-        except PackageNotFoundError:  # pragma: no cover - an incomplete installation
+            yield name, distribution(name).version
+        except PackageNotFoundError:  # an incomplete installation: the program did without it
             continue
-        yield from _needed(needed.name, known)
+        yield from _needed(name, known)
