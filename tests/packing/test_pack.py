@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from tests.commands.test_batch_commands import SCENARIO, STUDY
-from tests.refusals import each_mentions, mentions
+from tests.refusals import mentions
 from yawbench.fmus.packing import DESCRIPTION
 from yawbench.packing.wheel import lock, wheel
 
@@ -68,7 +68,7 @@ def test_an_archive_holds_what_the_study_reads_and_no_more(unpacked, project, fm
     assert requirements == [*(f"{name}=={version}" for name, version in lock().items()), f"./{wheel()[0]}"]
     readme = (unpacked / "README.md").read_text()
     digest = hashlib.sha256((fmus / "controller_off.fmu").read_bytes()).hexdigest()
-    assert each_mentions(readme, ("Half a paper",), ("sh repeat.sh",), ("controller_off", "Python", digest))
+    assert mentions(readme, "Half a paper") and mentions(readme, "controller_off", "Python", digest)
 
 
 def test_the_lock_names_each_package_once_and_what_packages_need():

@@ -7,7 +7,7 @@ import json
 import pytest
 
 from tests.commands.test_batch_commands import SCENARIO, STUDY
-from tests.refusals import each_mentions, mentions
+from tests.refusals import mentions
 from yawbench.studies.differences import differences, recorded_in
 
 UNITS = ("driver_sine", "reference_steady_state", "controller_off", "controller_fuzzy_sideslip")
@@ -57,12 +57,8 @@ def test_numbers_differ_by_their_share_and_verdicts_by_their_words(made, yawbenc
     assert (claim["verdict_first"], claim["verdict_second"]) == ("does not reproduce", "holds")
     status, out, _ = yawbench("diff", first, second)
     assert status == 0
-    assert each_mentions(
-        out,
-        ("Control is gentle.", "does not reproduce", "holds"),
-        ("1 of 2 numbers differ",),
-        ("fuzzy_sideslip", "-100 %"),
-    )
+    assert mentions(out, "Control is gentle.", "does not reproduce", "holds")
+    assert mentions(out, "1 of 2 numbers differ") and mentions(out, "fuzzy_sideslip", "-100 %")
     answer = json.loads(yawbench("diff", first, second, "--json")[1])
     assert answer["identical"] is False and answer["numbers"][0]["second"] == pair.second
 
