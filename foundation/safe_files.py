@@ -18,6 +18,7 @@ import functools
 import os
 import stat
 from collections.abc import Callable, Iterator
+from contextvars import ContextVar
 from pathlib import Path
 from typing import BinaryIO, Concatenate, ParamSpec, TypeVar
 
@@ -33,6 +34,20 @@ PACKED = 1_000_000_000
 """Bytes of an archive. Chosen: larger than all FMUs known to us, and it fits into memory."""
 NO_FOLLOW = getattr(os, "O_NOFOLLOW", 0)
 """Flag that refuses to open symbolic links; missing on Windows, where `refuse_link` alone has to do."""
+
+
+_READ: ContextVar[set[Path] | None] = ContextVar("_READ", default=None)
+
+
+@contextlib.contextmanager
+def noting_files() -> Iterator[set[Path]]:
+    """Yield a set that receives the absolute path of every user's file that this thread reads meanwhile."""
+    read: set[Path] = set()
+    token = _READ.set(read)
+    try:
+        yield read
+    finally:
+        _READ.reset(token)
 
 
 def check_regular(path: Path) -> None:
@@ -60,6 +75,8 @@ def open_regular(path: Path) -> BinaryIO:
     descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
     mode = os.fstat(descriptor).st_mode
     if stat.S_ISREG(mode):
+        if (read := _READ.get()) is not None:
+            read.add(Path(os.path.abspath(path)))
         return open(descriptor, "rb")
     os.close(descriptor)
     if stat.S_ISDIR(mode):

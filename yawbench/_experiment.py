@@ -30,7 +30,7 @@ from yawbench.studies.references import problems_of_figure, refuse
 from yawbench.studies.result_figures import draw_over_axes
 from yawbench.studies.result_files import columns_of
 from yawbench.studies.schema import FigureSpec
-from yawbench.studies.tables import to_pandas
+from yawbench.studies.tables import Table, to_latex, to_pandas
 from yawbench.studies.uncertainty import sample_columns
 
 from . import arguments
@@ -345,6 +345,51 @@ class Runs:
                 code="results-missing",
             )
         return to_pandas(tables[name])
+
+    def to_latex(
+        self, columns: Iterable[str] | Mapping[str, str] = (), *, caption: str | None = None, label: str = ""
+    ) -> str:
+        """Return a table for LaTeX with a row per run, in displayed units; it needs the package booktabs.
+
+            >>> axes = {"driver.amplitude": [0.02, 0.03]}
+            >>> made = yb.experiment(base, axes, metrics=["peak(sideslip)"]).run()
+            >>> text = made.to_latex({"driver.amplitude": "amplitude", "peak(sideslip)": "sideslip"})
+            >>> print(text.splitlines()[5])
+            amplitude & sideslip \\\\
+
+        Args:
+            columns: columns of the table, or a mapping of them to headings; default: axes and metrics.
+                Where a run failed, the status is added.
+            caption: above it; default: the title.
+            label: for `\\ref`, such as "tab:runs"; default: none.
+
+        Raises:
+            ScenarioError: there is no such column.
+        """
+        whole, spec = columns_of(self._findings), self._findings.spec
+        given = (
+            arguments.mapping(columns, "columns", "a mapping of columns to headings")
+            if isinstance(columns, Mapping)
+            else {name: name for name in arguments.texts(columns, "columns")}
+        )
+        headings = dict(given or {name: name for name in (*spec.axes, *spec.metrics)})
+        if self._findings.failed:
+            headings.setdefault("status", "status")
+        if unknown := [name for name in headings if name not in whole.headings]:
+            guess = hint(unknown[0], whole.headings, lead="there are")
+            raise ScenarioError(
+                f"columns: there is no column {short(unknown[0])}{guess}", code="argument-invalid"
+            )
+        chosen = [whole.headings.index(name) for name in headings]
+        table = Table(
+            spec.title if caption is None else arguments.text(caption, "caption", empty=True),
+            [
+                replace(whole.columns[k], heading=arguments.text(headings[whole.headings[k]], "columns"))
+                for k in chosen
+            ],
+            [[row[k] for k in chosen] for row in whole.rows],
+        )
+        return to_latex(table, label=arguments.text(label, "label", empty=True))
 
     def to_xarray(self) -> xr.Dataset:
         """Return all columns of all runs over the axes and time; `attrs["units"]` of each has its unit.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dis
 import functools
 import hashlib
 import inspect
@@ -13,6 +14,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 from yawbench.components.fmi.component import Component
 from yawbench.fmus.archive import runs_as
@@ -20,7 +22,7 @@ from yawbench.fmus.build import COMPONENTS, put
 from yawbench.fmus.build_stamp import BuildStamp, Edition
 from yawbench.fmus.fmi3_archive import to_fmi3
 from yawbench.fmus.native.compare_with_python import Twin, random_inputs
-from yawbench.fmus.packing import to_bytes
+from yawbench.fmus.packing import DESCRIPTION, to_bytes
 from yawbench.fmus.presentation import presented
 from yawbench.fmus.recipe import TOOL, PythonRecipe
 from yawbench.fmus.source_files import Parts, Sources, UserModules
@@ -56,9 +58,10 @@ def export_fmu(
     A `YawbenchWarning` names branches of its native library that were never compared with Python.
 
     The FMU is for co-simulation, with a native library where the program can be translated. It has the
-    program's parameters. One of FMI 2.0 contains the modules of the user's own package that it imports; one
-    of FMI 3.0 is native only. Before it is written, its outputs are compared with those of the program, bit
-    for bit.
+    program's parameters, and its `step_size` as that of the default experiment; it declares that it takes
+    other steps, too, unless the program's `advance` does not read its step `h`. One of FMI 2.0 contains the
+    modules of the user's own package that it imports; one of FMI 3.0 is native only. Before it is written,
+    its outputs are compared with those of the program, bit for bit.
 
     Args:
         controller: plain Python as in `Scenario.swap`.
@@ -101,6 +104,10 @@ def _write(controller: Any, path: Path, role: str, folder: str, edition: Edition
         files = presented(made.files, recipe.listing(), role=role, credits={})
         if edition.fmi == 3:
             files = to_fmi3(files)
+        if program.step_size is not None:
+            files[DESCRIPTION] = _with_step(
+                files[DESCRIPTION], program.step_size, only=not _takes_any_step(controller)
+            )
         key = hashlib.sha256(b"".join(files[name] for name in sorted(files))).hexdigest()[:32]
         stamp = BuildStamp(path.stem, key, source="Python", tool=TOOL, home=NOWHERE, edition=edition)
         put(path, to_bytes(files, stamp), *made.modules)
@@ -111,6 +118,31 @@ def _write(controller: Any, path: Path, role: str, folder: str, edition: Edition
         raise BuildError([f"{path.stem}: {text}" for text in sentences], code=error.code) from None
     except OSError as error:
         raise BuildError(f"{path}: cannot be written: {error}", code="component-unreadable") from None
+
+
+def _with_step(description: bytes, step: float, *, only: bool) -> bytes:
+    """Return a model description with the step [s] of its default experiment; `only`: it takes no other."""
+    root = ElementTree.fromstring(description)
+    for experiment in root.iter("DefaultExperiment"):
+        experiment.set("stepSize", repr(step))
+    for kind in root.iter("CoSimulation"):
+        kind.set("canHandleVariableCommunicationStepSize", "false" if only else "true")
+    text: bytes = ElementTree.tostring(root, encoding="UTF-8", xml_declaration=True)
+    return text + b"\n"
+
+
+def _takes_any_step(program: Any) -> bool:
+    """Return whether a law can be simulated with any step: its `advance`, if it has one, reads the step `h`.
+
+    One that does not, such as a difference equation, is right with the step alone that it declares.
+    """
+    advance = inspect.unwrap(getattr(program, "advance", Component.advance))
+    if getattr(advance, "__func__", advance) is Component.advance:
+        return True
+    code = advance.__code__
+    step = code.co_varnames[2]  # of self, t, h, u
+    read = (one.argval for one in dis.get_instructions(code) if one.opname.startswith("LOAD_"))
+    return step in code.co_cellvars or any(step in (x if isinstance(x, tuple) else (x,)) for x in read)
 
 
 @dataclass(frozen=True)
@@ -151,6 +183,8 @@ def _recipe(program: Any, known: PythonComponent, name: str, folder: str) -> Pyt
             text = form.of_class()
         else:
             text = form.of_function(program) if code is target else form.of_object(target)
+        if known.step_size is not None:  # into the sources, which the GUID is made of
+            text += f"\n\nSTEP_SIZE = {known.step_size!r}  # s, of the law\n"
         texts[f"{folder}/{name}.py"] = text
         difference = _difference(known, texts, (folder, name))
         if not difference:

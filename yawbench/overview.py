@@ -20,8 +20,11 @@ GROUPS = {
     "Many runs": ("study", "report", "sweep", "tune", "rank"),
     "Judge": ("evaluate", "drive", "validate"),
     "Cars": ("vehicle", "tyre", "measured", "fit"),
-    "Service": ("serve", "export-ssp", "second-opinion", "salvage", "cache", "schema"),
-}
+    "Other programs": (
+        "export", "export-fmu", "export-ssp", "export-can", "dbc", "second-opinion", "pack",
+    ),
+    "Service": ("serve", "salvage", "cache", "schema"),
+}  # fmt: skip
 """Heading -> commands; those of no group, such as of packages of others, come last."""
 OTHERS = "Others"
 HELP = ("-h", "--help")

@@ -14,6 +14,7 @@ WINGS = (
     "yawbench.interop",
     "yawbench.linear",
     "yawbench.measured_cars",
+    "yawbench.packing",
     "yawbench.ranking",
 )
 """Nothing outside a wing imports it: without its line and its folder the rest works."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shlex
 import shutil
 import sys
@@ -65,6 +66,31 @@ def project(tmp_path_factory):
         assert done.returncode == 0, done.stdout + done.stderr
         assert "pytest" not in command or "5 passed" in done.stdout
     return folder, printed
+
+
+def test_an_exercise_is_failed_as_it_begins_and_passed_with_a_law(project):
+    folder, _ = project
+    done = run_in(folder, "yawbench", "new", "exercise", "hold")
+    assert done.returncode == 0, done.stderr
+    _, build, test, study, mark = [shlex.split(line) for line in done.stdout.splitlines()]
+    law = folder / "controllers" / "hold.py"
+    begun = law.read_text()
+    results = []
+    for text in (begun, begun.replace("return 0.0  # your part", "return 2e4 * (yaw_rate_ref - yaw_rate)")):
+        law.write_text(text)
+        done = [run_in(folder, *command) for command in (build, test, study, mark)]
+        assert [one.returncode for one in done[::2]] == [0, 0], [one.stderr for one in done]
+        record = json.loads((folder / "results/hold/exercise/experiment.json").read_text())
+        marks = (folder / "exercises/hold/marks.csv").read_text().splitlines()[1].split(",")
+        results.append(
+            (done[1].returncode, [check["holds"] for check in record["checks"]], done[3].returncode, marks[2])
+        )
+    assert results == [(1, [False, True, False], 1, "fail"), (0, [True, True, True], 0, "pass")]
+    submission = folder / "broken.py"
+    submission.write_text("raise RuntimeError('no law yet')")
+    done = run_in(folder, *mark, submission)
+    assert done.returncode == 1 and mentions(done.stdout, "broken.py", "0 of 2", "no law yet")
+    assert "hold" in (folder / "exercises/hold/README.md").read_text()
 
 
 @pytest.fixture(scope="module")

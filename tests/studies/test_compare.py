@@ -21,7 +21,7 @@ from yawbench.metrics.expressions import MetricValue
 from yawbench.reports.comparison import BEST, comparison_view, metric_table
 from yawbench.studies import result_figures
 from yawbench.studies.claim_schema import MetricSpec
-from yawbench.studies.comparison import FIGURE_SPECS, comparison_table, variants
+from yawbench.studies.comparison import FIGURE_SPECS, comparison, comparison_table, variants
 from yawbench.studies.experiment import NamedRun, experiment_of
 from yawbench.studies.experiment_result import judge_results
 from yawbench.studies.jobs import Job, Outcome
@@ -210,3 +210,18 @@ def test_the_best_is_marked_where_it_reads_better_and_doing_nothing_wins_no_effo
 def test_folders_are_told_apart_by_the_shortest_ends_of_their_paths():
     assert distinct([Path("a/fnn"), Path("a/off")]) == ["fnn", "off"]
     assert distinct([Path("a/fnn"), Path("b/fnn")]) == ["a/fnn", "b/fnn"]
+
+
+def test_labels_name_the_runs_in_their_order_and_metrics_are_those_asked_for(scenario, monkeypatch):
+    loaded = SimpleNamespace(title="T")
+    monkeypatch.setattr("yawbench.studies.comparison.Planner.load", lambda *_, **__: loaded)
+    swaps = ["controller=a,b"]
+    made = comparison(scenario, swaps, (), labels=["no control", "ours"], metrics=["peak(sideslip)"])
+    assert [(run.name, run.label, run.row) for run in made.runs.values()] == [
+        ("a", "no control", "no control"),
+        ("b", "ours", "ours"),
+    ]
+    assert [spec.metric for spec in made.spec.metrics.values()] == ["peak(sideslip)"]
+    for wrong in (["one"], ["twice", "twice"]):
+        with refused(ScenarioError, "option-invalid", names=("--label", "a", "b")):
+            comparison(scenario, swaps, (), labels=wrong)

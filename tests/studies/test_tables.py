@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+import shutil
+import subprocess
 
 import numpy as np
 import pytest
 from rich.console import Console
 
+from yawbench.figures.latex import escaped
 from yawbench.metrics.expressions import MetricValue
 from yawbench.studies.tables import Column, Table, column, for_terminal, to_csv, to_latex, to_pandas
 
@@ -54,14 +57,52 @@ def test_a_table_is_the_same_on_the_terminal_and_in_latex(runs):
     with console.capture() as printed:
         console.print(for_terminal(runs))
     latex = to_latex(runs)
-    for cell in ("28.6 °", "2.00 m", "12", "made in 1 s", "Runs"):
+    for cell in ("28.6 ", "2.00 m", "12", "made in 1 s", "Runs"):
         assert all(cell in text for text in (printed.get(), latex))
     assert r"\begin{tabular}{lrrr}" in latex
-    assert r"50 \% \& more & 28.6 ° & 25.0 \% & 3 \\" in latex
-    assert r"a|b\_c \newline d & - & 2.00 m & 12 \\" in latex
+    assert r"50 \% \& more & 28.6 \ensuremath{^\circ} & 25.0 \% & 3 \\" in latex
+    assert r"\begin{tabular}[t]{@{}l@{}}a\textbar{}b\_c \\ d\end{tabular} & - & 2.00 m & 12 \\" in latex
 
 
 def test_a_table_without_rows_keeps_the_kinds_of_its_columns():
     table = Table("", [Column("run", "int64"), Column("slip", "float64", {"unit": "rad"})])
     assert to_pandas(table).dtypes.to_list() == [np.int64, np.float64]
     assert to_csv(table) == "run,slip [rad]\n"
+
+
+ODD = (
+    "".join(map(chr, [*range(0x20, 0x7F), *range(0xA1, 0x250), *range(0x370, 0x400)])),
+    "√∫∂≤≥≠≈∞→✓✗★†±×·−–—‘’“”…€™⁻¹²₃½ﬁ％中🚗",
+    "[0.5 m] at the beginning",
+    "* at the beginning",
+    "--set and ---",
+)
+"""Everything that a name, a title, a unit or a note may hold."""
+
+
+@pytest.mark.exhaustive
+@pytest.mark.skipif(not shutil.which("pdflatex"), reason="there is no pdfLaTeX")
+def test_tables_of_every_character_compile_with_booktabs_alone_and_are_readable(tmp_path):
+    tables = [
+        Table(text, ["a", text], [[text, 1.0], [f"{text}\nsecond", None]], [f"note {text}", "two\n\nlines"])
+        for text in ODD
+    ]
+    body = "\n".join(to_latex(table, label=f"tab:{k}") for k, table in enumerate(tables))
+    document = rf"\documentclass{{article}}\usepackage{{booktabs}}\begin{{document}}{body}\end{{document}}"
+    (tmp_path / "doc.tex").write_text(document, encoding="utf-8")
+    command = ["pdflatex", "-interaction=nonstopmode", "-halt-on-error", "doc"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, errors="replace")
+    assert done.returncode == 0, done.stdout[-1500:]
+    log = (tmp_path / "doc.log").read_text(errors="replace")
+    assert "Missing character" not in log and "not defined" not in log
+
+
+def test_characters_that_latex_lacks_are_commands_or_numbers():
+    assert escaped("δ_f ≤ 2 °/s² ") == (
+        r"\ensuremath{\delta}\_f \ensuremath{\le} 2 \ensuremath{^\circ}/s\textsuperscript{2} "
+    )
+    assert escaped("λ φ ς Δ Β") == " ".join(
+        rf"\ensuremath{{{one}}}" for one in (r"\lambda", r"\varphi", r"\varsigma", r"\Delta", r"\mathrm{B}")
+    )
+    assert escaped("Zürich 中 Ħ") == "Zürich {[}U+4E2D] {[}U+0126]"
+    assert escaped("--set [1]") == "-{}-set {[}1]"

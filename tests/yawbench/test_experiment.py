@@ -177,3 +177,26 @@ def test_only_instances_have_labels(base):
     with pytest.raises(yb.ScenarioError) as caught:
         yb.experiment(base, {"driver.amplitude": {"small": 0.02}})
     assert caught.value.code == "argument-invalid"
+
+
+def test_a_table_for_latex_has_the_columns_that_are_asked_for_in_displayed_units(runs):
+    whole = runs.to_latex()
+    assert r"controller & plant.initial\_speed & peak(sideslip) & peak(yaw\_moment) \\" in whole
+    assert whole.count("km/h") == 4
+    chosen = runs.to_latex({"controller": "law", "peak(sideslip)": "side & slip"}, caption="", label="tab:x")
+    lines = chosen.splitlines()
+    assert lines[2:6] == [r"\label{tab:x}", r"\begin{tabular}{lr}", r"\toprule", r"law & side \& slip \\"]
+    angle = np.degrees(runs.table["peak(sideslip)"][0])
+    assert lines[7] == rf"controller\_off & {angle:.3g} \ensuremath{{^\circ}} \\"
+    with refused(yb.ScenarioError, "argument-invalid", names=("columns", "'peak(sideslip)'")):
+        runs.to_latex(["peak(sidesli)"])
+
+
+def test_a_table_for_latex_says_which_runs_failed(base):
+    def fails(yaw_rate, limit=1.0):
+        return 0.0 if limit < 2.0 else 1.0 / 0.0
+
+    axes = {"controller.limit": [1.0, 3.0]}
+    made = yb.experiment(base.swap(controller=fails), axes, metrics=["peak(sideslip)"]).run(workers=1)
+    rows = [line for line in made.to_latex(["controller.limit"]).splitlines() if line.endswith(r"\\")]
+    assert rows == [r"controller.limit & status \\", r"1.00 & completed \\", r"3.00 & failed \\"]

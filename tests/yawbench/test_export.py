@@ -250,3 +250,73 @@ def test_names_and_roles_that_no_fmu_can_have_are_refused(tmp_path):
     ):
         with refused(yb.ScenarioError, "argument-invalid", names=names):
             yb.export_fmu(law, **wrong)
+
+
+class Filtered:
+    """A law with a step of its own, by which it advances."""
+
+    inputs, outputs = ("yaw_rate",), ("yaw_moment",)
+    step_size = 0.004
+
+    def start(self, t, u):
+        self.x = 0.0
+
+    def advance(self, t, h, u):
+        self.x += h * (u.yaw_rate - self.x)
+
+    def output(self, t, u):
+        return 1e4 * self.x
+
+
+class Difference(Filtered):
+    """The same as a difference equation, right for its own step alone."""
+
+    def advance(self, t, h, u):
+        self.x += 0.004 * (u.yaw_rate - self.x)
+
+
+class Plain:
+    """A law without a state."""
+
+    inputs, outputs = ("yaw_rate",), ("yaw_moment",)
+    step_size = 0.02
+
+    def output(self, t, u):
+        return 1e4 * u.yaw_rate
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize(
+    ("law", "step", "any_step"),
+    [(Filtered(), 0.004, True), (Difference(), 0.004, False), (Plain(), 0.02, True)],
+)
+def test_the_step_of_a_law_is_that_of_its_fmu_and_the_only_one_if_its_state_does_not_follow_it(
+    law, step, any_step, fmi, tmp_path
+):
+    fmu = yb.export_fmu(law, tmp_path / "stepped.fmu", fmi=fmi)
+    described = fmpy.read_model_description(str(fmu))
+    assert float(described.defaultExperiment.stepSize) == step
+    assert described.coSimulation.canHandleVariableCommunicationStepSize is any_step
+    inputs = np.array([(0.0, 0.1)], dtype=[("time", float), ("yaw_rate", float)])
+    made = fmpy.simulate_fmu(str(fmu), stop_time=10 * step, input=inputs, output=["yaw_moment"])
+    assert np.diff(made["time"]) == pytest.approx(step)
+
+
+def test_another_step_than_the_only_one_is_warned_of_and_the_own_is_not(base, tmp_path):
+    fmu = yb.export_fmu(Difference(), tmp_path / "stepped.fmu")
+    with pytest.warns(yb.YawbenchWarning, match="step_size=0.004"):
+        base.swap(controller=fmu).run()
+    by_fmu = base.swap(controller=fmu).set({"controller.step_size": 0.004}).run()
+    by_python = base.swap(controller=Difference()).run()
+    assert (by_fmu["controller.yaw_moment"] == by_python["controller.yaw_moment"]).all()
+
+
+def test_laws_that_differ_in_their_step_alone_are_not_one_fmu(tmp_path):
+    slow = Plain()
+    slow.step_size = 0.05
+    guids = [
+        fmpy.read_model_description(str(yb.export_fmu(law, tmp_path / f"{folder}" / "plain.fmu"))).guid
+        for folder, law in (("a", Plain()), ("b", slow))
+        if (tmp_path / folder).mkdir() is None
+    ]
+    assert len({*guids}) == 2

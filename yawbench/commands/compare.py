@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -19,6 +19,7 @@ from yawbench.commands.options import (
 )
 from yawbench.commands.output import hold, print_tables, tabular
 from yawbench.commands.recorded_runs import MeasuredFrom, MeasuredRuns, distinct, start_of, with_segments
+from yawbench.commands.run import MetricsOption, metric_names
 
 if TYPE_CHECKING:
     from yawbench.figures.display import LabelledRun
@@ -33,6 +34,14 @@ Swaps = Annotated[
         "bring parameters, FMU:PARAMETER=VALUE. Repeatable.",
     ),
 ]
+Labels = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--label",
+        metavar="TEXT",
+        help="Label of a run in tables and figures, in the order of the runs. Repeatable.",
+    ),
+]
 
 
 @tabular
@@ -42,6 +51,8 @@ def compare(
     scenario: ScenarioFile,
     swap: Swaps,
     options: RunOptions,
+    metric: MetricsOption = None,
+    label: Labels = None,
     measured: MeasuredRuns = None,
     begin: MeasuredFrom = "0 s",
 ) -> None:
@@ -63,9 +74,13 @@ def compare(
     folder = options.out or default_folder(scenario, options.changes, suffix="-compare")
     hold(context, folder)
     each = pooled(context, options)
-    findings = conduct(comparison(scenario, swap, options.changes), folder, options, each)
+    compared_runs = comparison(
+        scenario, swap, options.changes, labels=label or (), metrics=metric_names(metric or ())
+    )
+    findings = conduct(compared_runs, folder, options, each)
     print_tables([comparison_table(findings)])
-    beside = {"measured": measured, "from": [begin]} if measured else {}
+    beside: dict[str, Any] = {"metric": metric, "label": label}
+    beside |= {"measured": measured, "from": [begin]} if measured else {}
     command = command_of("compare", scenario, **options.changing | {"swap": swap} | beside)
     compared = comparison_view(findings)
     views = compared.views if compared else []

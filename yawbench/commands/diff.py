@@ -1,4 +1,4 @@
-"""`yawbench diff`: the differences between two runs."""
+"""`yawbench diff`: the differences between two runs, or between two studies."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import typer
 from yawbench.commands import output
 from yawbench.commands.output import print_tables, say, tabular
 from yawbench.commands.recorded_runs import MeasuredFrom
+from yawbench.foundation.messages import counted
 
 FirstRun = Annotated[Path, typer.Argument(help="Results folder, or measurement file.", metavar="RUN")]
 SecondRun = Annotated[
@@ -19,13 +20,20 @@ SecondRun = Annotated[
 
 @tabular
 def diff(first_run: FirstRun, second_run: SecondRun, begin: MeasuredFrom = "0 s") -> None:
-    """Show the differences between two runs.
+    """Show the differences between two runs, or between the results of two studies or sweeps.
 
-    First the inputs: scenario, parameters, FMUs, connections, program versions. Then the results, signal
-    by signal: when they start to differ, when the difference becomes visible (1 % of the signal's
-    largest value), and the largest difference. The filter of a measurement acts on the other run, too, which
-    is interpolated to the times of the measurement. Exit status 1 if nothing could be compared.
+    Of studies: claims whose verdict changed, runs that one alone has or that failed in one alone, numbers
+    by how much, the largest first. Of runs, first the inputs: scenario, parameters, FMUs, connections,
+    program versions. Then the results, signal by signal: when they start to differ, when the difference
+    becomes visible (1 % of the signal's largest value), and the largest difference. The filter of a
+    measurement acts on the other run, too, which is interpolated to the times of the measurement. Exit
+    status 1 if nothing could be compared.
     """
+    from yawbench.studies.differences import is_experiment
+
+    if is_experiment(first_run) and is_experiment(second_run):
+        _of_studies(first_run, second_run)
+        return
     from yawbench.reports.divergence import divergence, outcome_table
     from yawbench.reports.record_differences import differences, differences_table
 
@@ -58,3 +66,24 @@ def diff(first_run: FirstRun, second_run: SecondRun, begin: MeasuredFrom = "0 s"
         raise typer.Exit(1)
     if not (inputs or parted.partings or parted.notes):
         say("The runs are identical: same inputs, same numbers.")
+
+
+def _of_studies(first: Path, second: Path) -> None:
+    """Show what differs between the results of two studies or sweeps."""
+    from yawbench.studies.differences import difference_tables, differences, recorded_in
+
+    from .recorded_runs import distinct
+
+    found = differences(recorded_in(first), recorded_in(second))
+    output.answer(**found.as_data())
+    print_tables(difference_tables(found, *distinct([first, second])))
+    if found.compares_nothing:
+        say(f"{first}, {second}: nothing could be compared")
+        raise typer.Exit(1)
+    if found.none:
+        say(
+            f"The results are identical: {counted(found.judged, 'verdict')}, "
+            f"{counted(found.compared, 'number')}."
+        )
+    elif not found.numbers:
+        say(f"{counted(found.compared, 'number')}: all the same")

@@ -85,7 +85,7 @@ MORE = {"road": ("road_patchwork", "")}
 """Instances that this run does not have."""
 ROLES = ("controller", "driver", "reference", "tyre", "plant", "road")
 """Roles that have templates."""
-KINDS = (*ROLES, "vehicle", "scenario", "study", "sweep")
+KINDS = (*ROLES, "vehicle", "scenario", "study", "sweep", "exercise")
 """All kinds of templates."""
 LAW = {"gain": 20000.0, "integral_gain": 50000.0, "limit": 5000.0}
 """Gains and limit of the controller [N.m.s/rad, N.m/rad, N.m]; chosen: they hold paper A's car."""
@@ -121,6 +121,8 @@ def begin(kind: str, name: str, language: Language = "python", *, in_checkout: b
     }
     if kind in ROLES:
         return _unit(kind, name, language, in_checkout, scenario, facts)
+    if kind == "exercise":
+        return _exercise(name, in_checkout, scenario, facts)
     templates = {scenario: "scenario.yaml.j2"}
     main = scenario
     if kind == "vehicle":
@@ -129,6 +131,22 @@ def begin(kind: str, name: str, language: Language = "python", *, in_checkout: b
         main = scenario.with_name(f"{kind}.yaml")
         templates[main] = f"{kind}.yaml.j2"
     return NewFiles(_rendered(templates, facts), main)
+
+
+def _exercise(name: str, in_checkout: bool, scenario: PurePosixPath, facts: dict[str, Any]) -> NewFiles:
+    """Return an exercise: a controller without its law, tests, a study that judges it, marking, the task."""
+    unit = _unit("controller", name, "python", in_checkout, scenario, facts)
+    assert unit.source and unit.test
+    facts |= {"test": unit.test, "scenario_path": scenario, "components": "yawbench.components"}
+    home, study = PurePosixPath("exercises", name), scenario.with_name("exercise.yaml")
+    own = {
+        unit.source: "exercise_controller.py.j2",
+        unit.test: "exercise_test.py.j2",
+        study: "exercise_study.yaml.j2",
+        home / "mark.py": "exercise_mark.py.j2",
+        home / "README.md": "exercise.md.j2",
+    }
+    return NewFiles(unit.files | _rendered(own, facts), study, unit.source, unit.test)
 
 
 def _unit(
@@ -215,7 +233,7 @@ def write_schemas(files: Iterable[PurePosixPath], folder: Path) -> None:
 
 def _schema_kind(path: PurePosixPath) -> str:
     """Return the kind of a new YAML file, in the words of `kinds`."""
-    return {"study": "experiment", "sweep": "experiment"}.get(
+    return {"study": "experiment", "sweep": "experiment", "exercise": "experiment"}.get(
         path.stem, "vehicle" if path.parent == VEHICLES else "scenario"
     )
 
@@ -256,14 +274,16 @@ def new(
 
     KIND is a component (controller, driver, reference, tyre, plant, road), written with a test and a
     scenario that uses it; a vehicle with a scenario; a scenario, with --from a copy of another, whose files
-    are still found; or a study or sweep of a scenario. The
+    are still found; a study or sweep of a scenario; or an exercise: a controller without its law, tests, a
+    study that judges it, a script that marks, the task. The
     commands to run next are printed. In a checkout of yawbench the files go beside its own, where
     `yawbench build` finds them; elsewhere into folders controllers, tests, scenarios and so on. Existing
     files are never overwritten.
     """
     from yawbench.fmus.build import COMPONENTS, find_recipes
 
-    check_name(name, role=kind, taken=set(find_recipes()))
+    role = "controller" if kind == "exercise" else kind
+    check_name(name, role=role, taken=set(find_recipes()))
     if language == "c" and kind != "controller":
         raise ScenarioError("--language c: only available for controllers", code="name-invalid")
     if source is not None and kind != "scenario":
@@ -330,7 +350,8 @@ def _next(kind: str, name: str, begun: NewFiles, folder: Path, in_checkout: bool
     fmus = [] if in_checkout else ["--out", str(_shown(folder / "fmus"))]
     written = " ".join(begun.files.values())
     used = [name for name in find_recipes() if re.search(rf"\b{name}\b", written)]
-    other = "controller_off" if kind == "controller" else (UNITS | MORE)[kind][0] if begun.source else ""
+    role = "controller" if kind == "exercise" else kind
+    other = "controller_off" if role == "controller" else (UNITS | MORE)[role][0] if begun.source else ""
     needed = [] if in_checkout else sorted({*used, *filter(None, [other])})
     commands = [[yawbench, "build", *needed, *fmus]]
     if begun.source and not in_checkout:
@@ -340,8 +361,11 @@ def _next(kind: str, name: str, begun: NewFiles, folder: Path, in_checkout: bool
             commands.append([python, "-m", "pip", "install", "pytest"])
         commands.append([python, "-m", "pytest", str(_shown(folder / begun.test))])
     main = str(_shown(folder / begun.main))
-    commands.append([yawbench, kind if kind in ("study", "sweep") else "run", main])
-    if begun.source:
+    command = {"study": "study", "sweep": "sweep", "exercise": "study"}.get(kind, "run")
+    commands.append([yawbench, command, main])
+    if kind == "exercise":
+        commands.append([python, str(_shown(folder / "exercises" / name / "mark.py"))])
+    elif begun.source:
         commands.append([yawbench, "compare", main, "--swap", f"{kind}={other},{kind}_{name}"])
     return commands
 

@@ -110,7 +110,7 @@ def run(
         raise ScenarioError(
             f"--realtime: must be above 0 and below {FASTEST:g} (got {realtime:g})", code="option-invalid"
         )
-    metrics = _metric_names(metric or ())
+    metrics = metric_names(metric or ())
     plan = plan_of_scenario(scenario, options, record or ())
     output.note(plan.diagnostics)
     if named := [name for name in metric or () if name != "standard"]:
@@ -228,7 +228,7 @@ def _say_warnings(diagnostics: Iterable[Diagnostic]) -> None:
         say(f"note: {warning}")
 
 
-def _metric_names(texts: Sequence[str]) -> list[str]:
+def metric_names(texts: Sequence[str]) -> list[str]:
     """Return the metrics given by `--metric`, each once."""
     if not texts:
         return []

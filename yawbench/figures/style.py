@@ -10,7 +10,6 @@ import math
 import re
 import sys
 import textwrap
-import unicodedata
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -22,6 +21,8 @@ from yawbench.foundation.messages import cut, printable
 from yawbench.foundation.safe_files import reason, write_whole
 from yawbench.measurements.measured_results import MeasuredResults
 from yawbench.orchestrator.results.reader import Results
+
+from .latex import characters
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -220,7 +221,7 @@ def save(figure: Figure, stem: Path, kinds: Sequence[str] = ("svg", "png")) -> l
                 content = io.BytesIO()
                 known: dict[str, Any] = {"metadata": KINDS[kind]} if KINDS[kind] else {}  # PGF takes none
                 for text in figure.findobj(Text) if kind == "pgf" else ():
-                    text.set_text(_for_latex(text.get_text()))
+                    text.set_text(characters(text.get_text()))
                 figure.savefig(content, format=kind, **known)
                 written = content.getvalue()
                 write_whole(path, OWN_FONTS.sub(b"", written) if kind == "pgf" else written)
@@ -244,19 +245,6 @@ def save(figure: Figure, stem: Path, kinds: Sequence[str] = ("svg", "png")) -> l
 
 OWN_FONTS = re.compile(rb"^%%.*\\detokenize.*\n", re.MULTILINE)
 """Comments in PGF on the files of this computer's fonts."""
-LATEX = {"\N{MINUS SIGN}": "-", "°": r"^\circ", "²": "^2", "³": "^3", "·": r"\cdot"}
-"""Characters in units and numbers -> mathematics in LaTeX, whose fonts may lack them."""
-
-
-def _for_latex(text: str) -> str:
-    """Return a text that all engines of LaTeX read: mathematics in place of `LATEX` and Greek letters."""
-
-    def command(match: re.Match[str]) -> str:
-        name = unicodedata.name(match[0]).lower().rpartition(" ")[2]
-        letter = "\\" + "var" * (name == "phi") + name
-        return rf"\ensuremath{{{LATEX.get(match[0], letter)}}}"
-
-    return re.sub(f"[α-ω{''.join(LATEX)}]", command, text)
 
 
 def reference_words(lines: Iterable[Line2D]) -> str | None:

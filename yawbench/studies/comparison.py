@@ -5,10 +5,12 @@ from __future__ import annotations
 import itertools
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from yawbench.fmus.fmu import is_path
 from yawbench.foundation.errors import ScenarioError
+from yawbench.foundation.messages import counted, listed
 from yawbench.metrics.expressions import metric
 from yawbench.metrics.verdict import Status, worded
 from yawbench.orchestrator.plan import Override
@@ -16,7 +18,7 @@ from yawbench.orchestrator.scenario.overrides import changed, swap_of
 from yawbench.orchestrator.scenario.schema_validation import made
 from yawbench.planner import Planner
 
-from .claim_schema import text_of
+from .claim_schema import MetricSpec, text_of
 from .experiment import LoadedExperiment, NamedRun, experiment_of
 from .experiment_result import ExperimentResult
 from .schema import FigureSpec
@@ -34,13 +36,38 @@ FIGURE_SPECS = [
 ]
 
 
-def comparison(scenario: Path, swaps: Sequence[str], changes: Sequence[Override]) -> LoadedExperiment:
-    """Return the experiment that compares a scenario's variants (see `variants`)."""
+def comparison(
+    scenario: Path,
+    swaps: Sequence[str],
+    changes: Sequence[Override],
+    *,
+    labels: Sequence[str] = (),
+    metrics: Sequence[str] = (),
+) -> LoadedExperiment:
+    """Return the experiment that compares a scenario's variants (see `variants`).
+
+    Args:
+        scenario, swaps, changes: see `variants`.
+        labels: of the variants, in their order; default: their own.
+        metrics: names of metrics; default: the standard ones.
+
+    Raises:
+        ScenarioError: see `variants`; or the labels do not fit.
+    """
     runs = variants(scenario, swaps, changes)
+    if labels and (len(labels) != len(runs) or len({*labels}) < len(labels)):
+        given = listed([run.label for run in runs], last="and")
+        raise ScenarioError(
+            f"--label: give one label per run, all different: {counted(len(labels), 'label')} for {given}",
+            code="option-invalid",
+        )
+    if labels:
+        runs = [replace(run, label=label, row=label) for run, label in zip(runs, labels, strict=True)]
     title = Planner().load(scenario, changes).title or scenario.stem
     exchanged = " and ".join(dict.fromkeys(text.partition("=")[0].strip() for text in swaps))
     title = f"{title} ({exchanged} exchanged)"
-    return experiment_of(scenario, runs, changes=changes, title=title, figures=FIGURE_SPECS)
+    specs = {name: made(MetricSpec, f"metrics.{name}", metric=name) for name in metrics}
+    return experiment_of(scenario, runs, changes=changes, title=title, figures=FIGURE_SPECS, metrics=specs)
 
 
 def variants(scenario: Path, swaps: Sequence[str], changes: Sequence[Override]) -> list[NamedRun]:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from yawbench.events.kinds import events_in
 from yawbench.events.why import lost_among
 from yawbench.figures.display import shown
+from yawbench.figures.latex import escaped
 from yawbench.foundation.errors import text_of
 from yawbench.foundation.messages import printable
 from yawbench.metrics.expressions import (
@@ -368,29 +369,32 @@ def to_csv(table: Table) -> str:
     return text.getvalue()
 
 
-def to_latex(table: Table) -> str:
-    """Return a table for LaTeX with the package booktabs; its notes as a paragraph below."""
+def to_latex(table: Table, *, label: str = "") -> str:
+    """Return a table for LaTeX with the package booktabs; its notes as a paragraph below.
+
+    `label`: for `\\ref`.
+    """
     shape = "".join("r" if table.is_number(k) else "l" for k in range(len(table.columns)))
-    rows = [" & ".join(map(_latex, row)) + r" \\" for row in table.text()]
+    rows = [" & ".join(map(_cell_in_latex, row)) + r" \\" for row in table.text()]
     lines = [
-        *([rf"\caption{{{_latex(table.title)}}}"] if table.title else []),
+        *([rf"\caption{{{_in_latex(table.title)}}}"] if table.title else []),
+        *([rf"\label{{{label}}}"] if label else []),
         rf"\begin{{tabular}}{{{shape}}}", r"\toprule",
-        " & ".join(map(_latex, table.headings)) + r" \\", r"\midrule",
+        " & ".join(map(_cell_in_latex, table.headings)) + r" \\", r"\midrule",
         *rows, r"\bottomrule", r"\end{tabular}",
-        *(rf"\par {_latex(note)}" for note in table.notes),
+        *(rf"\par {_in_latex(note)}" for note in table.notes),
     ]  # fmt: skip
     return "\n".join([r"\begin{table}", r"\centering", *lines, r"\end{table}", ""])
 
 
-_LATEX = str.maketrans({
-    "\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}", "\n": r" \newline ",
-    **{sign: f"\\{sign}" for sign in "&%$#_{}"},
-})  # fmt: skip
+def _in_latex(text: str) -> str:
+    return escaped(" ".join(printable(text).split()))
 
 
-def _latex(text: str) -> str:
-    """Return text with the characters escaped that mean something to LaTeX."""
-    return text.translate(_LATEX)
+def _cell_in_latex(text: str) -> str:
+    """Return a cell for LaTeX; one of several lines is a table of its own."""
+    lines = r" \\ ".join(map(_in_latex, text.splitlines()))
+    return rf"\begin{{tabular}}[t]{{@{{}}l@{{}}}}{lines}\end{{tabular}}" if "\n" in text else lines
 
 
 def _plain(row: Sequence[Any]) -> list[str]:
