@@ -27,7 +27,7 @@ from yawbench.studies.result_tables import margin_words
 from yawbench.studies.tables import Table
 from yawbench.vocabulary.signals import SIGNALS
 
-from .page_parts import Document, render
+from .page_parts import ViewerPage, render
 from .viewer import LARGEST, MOST, Settings, View, assets, viewer
 
 PANELS = ("steering_wheel_angle", "yaw_rate", "sideslip", "acceleration_y", "cone_overrun")
@@ -96,7 +96,7 @@ def evaluation_page(
     runs = [LabelledRun(label, results_of(trace)) for label, trace in zip(labels, traces, strict=True)][:MOST]
     settings = Settings(views, marks=marks, limits=limits, dashed_of=deciding[0], largest=LARGEST)
     dashed = [*(f"{instant:.3f} s: {text}" for instant, text in marks), *map(_limit_words, limits)]
-    view = Document(
+    view = ViewerPage(
         title=f"{test.name.replace('-', ' ').capitalize()}: {counted(len(judged), 'run')}",
         below=f"{test.says[:1].upper()}{test.says[1:]}.",
         sentence=series.summary if series else _sentence(criteria, judged),
