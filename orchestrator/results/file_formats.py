@@ -111,7 +111,10 @@ class ResultsSource(Protocol):
     """Names of all columns, `time` first."""
 
     def blocks(self, columns: Sequence[str]) -> Iterator[list[np.ndarray]]:
-        """Yield the chosen columns, a block of rows at a time, each passed through `plain`."""
+        """Yield the chosen columns, a block of rows at a time, each passed through `plain`.
+
+        Nothing is yielded if there are no rows. Booleans are 0 and 1.
+        """
 
 
 def plain(array: np.ndarray) -> np.ndarray:

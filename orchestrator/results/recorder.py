@@ -102,7 +102,7 @@ class Recorder(RowBlock):
 
     file = RESULTS_FILE
     rows_stay = True
-    """Whether rows already written can be read if the run dies."""
+    """Whether rows already written can be read if the run dies: only those of CSV, see `salvage`."""
 
     def __init__(
         self,

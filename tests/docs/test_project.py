@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from ruamel.yaml import YAML
 
+from docs.generate.rooms import pages
 from tests.checkout import ROOT
 
 if sys.version_info >= (3, 11):
@@ -19,6 +20,7 @@ else:
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 CITATION = YAML(typ="safe").load(ROOT / "CITATION.cff")
 CONTRIBUTING = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+ARCHITECTURE = (ROOT / "docs/architecture.md").read_text(encoding="utf-8")
 
 
 def test_project_changelog_and_citation_name_one_version_and_its_date():
@@ -34,15 +36,20 @@ def test_the_citation_has_what_its_format_requires():
     assert CITATION["license"] == PROJECT["project"]["license"]
 
 
-def test_files_that_the_contributing_guide_names_exist():
+@pytest.mark.parametrize("text", [CONTRIBUTING, ARCHITECTURE], ids=["CONTRIBUTING", "architecture"])
+def test_files_that_the_guides_of_contributors_name_exist(text):
     named = re.findall(
         r"`((?:components|foundation|fmus|vocabulary|orchestrator|scenarios|tests|docs|yawbench)/[\w/]+\.?\w*)",
-        CONTRIBUTING,
+        text,
     )
-    named += re.findall(r"\]\(([\w/.]+\.md)", CONTRIBUTING)
+    named += re.findall(r"\]\((docs/[\w/.]+\.md)", text)
     written = [path for path in named if "NAME" not in path]
     assert len(written) > 8
     assert [path for path in written if not (ROOT / path).exists()] == []
+
+
+def test_the_architecture_links_the_page_of_every_room():
+    assert {page for page in pages() if f"({page})" not in ARCHITECTURE} == set()
 
 
 def test_make_has_every_target_that_the_contributing_guide_and_the_readme_name():

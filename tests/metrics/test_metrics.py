@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -25,11 +26,12 @@ from yawbench.metrics.expressions import (
     why_none,
 )
 from yawbench.metrics.measures import catalogue
-from yawbench.metrics.verdict import compare
+from yawbench.metrics.verdict import RELATIONS, Relation, compare
 from yawbench.orchestrator.results.reader import Results
 from yawbench.orchestrator.results.run_record import ConnectionRecord, FmuRecord, RunRecord
 from yawbench.proving_ground.standard_tests import Evaluation
 from yawbench.reports.divergence import divergence, partings_table
+from yawbench.studies.claim_schema import Condition
 from yawbench.studies.driven_tests import run_table
 from yawbench.studies.listings import metrics_of_run
 from yawbench.vocabulary.wheels import WHEELS
@@ -217,6 +219,11 @@ def test_every_measure_can_be_applied_and_says_its_formula_and_unit():
         assert value.number >= 0 or name in ("final", AT_A_TIME)
         assert "{" not in chosen.formula
         assert measure.definition
+
+
+def test_every_relation_has_a_kind_and_a_key_of_conditions():
+    assert get_args(Relation) == tuple(RELATIONS)
+    assert RELATIONS.keys() <= Condition.model_fields.keys()
 
 
 def test_a_ratio_has_the_unit_of_its_number_and_is_shown_in_per_cent():

@@ -15,6 +15,7 @@ from tests.orchestrator.recorded import car, record_text, write
 from tests.refusals import mentions, refused
 from yawbench.cli import main
 from yawbench.foundation.errors import ResultsError, ScenarioError, SimulationError, YawbenchError
+from yawbench.foundation.messages import listed
 from yawbench.orchestrator.master.simulate import simulate, simulate_in_memory
 from yawbench.orchestrator.results import parquet_and_mdf
 from yawbench.orchestrator.results.file_formats import FILES
@@ -25,7 +26,7 @@ from yawbench.orchestrator.results.run_record import RunRecord
 COLUMNS = ["a.n", "a.x", "a.s", "a.y", "a.b"]
 REAL = [False, True, False, True, False]
 UNITS = {"time": "s", "a.x": "rad/s", "a.y": "N.m", "a.n": None}
-OTHERS = ["parquet", "mf4"]
+OTHERS = [name for name in FILES if name != "csv"]
 
 
 def fill(writer, rows):
@@ -198,7 +199,7 @@ def test_a_disk_without_room_is_one_sentence_and_keeps_the_earlier_results(name,
 
 
 def test_an_unknown_format_names_those_there_are():
-    with refused(ScenarioError, "format-unknown", names=("--format hdf5", "csv", "parquet", "mf4")):
+    with refused(ScenarioError, "format-unknown", names=("--format hdf5", *FILES)):
         recorder_of("hdf5")
 
 
@@ -227,7 +228,7 @@ def test_a_record_that_names_another_file_is_refused(tmp_path):
     with refused(
         ResultsError,
         "results-unreadable",
-        names=("run.json", "'../secret.csv'", "results.csv", "results.parquet", "results.mf4"),
+        names=("run.json", "'../secret.csv'", *FILES.values()),
     ):
         load_results(folder)
 
@@ -268,7 +269,7 @@ def test_run_writes_the_format_it_is_told_and_prints_metrics(driver, tmp_path, c
 @pytest.mark.parametrize(
     ("option", "sentence"),
     [
-        (["--format", "hdf5"], "--format hdf5: no such format; there are: csv, parquet and mf4"),
+        (["--format", "hdf5"], f"--format hdf5: no such format; there are: {listed(FILES)}"),
         (
             ["--metric", "peek(sideslip)"],
             "'peek(sideslip)': there is no measure 'peek'; did you mean 'peak'?",

@@ -219,7 +219,7 @@ def _lengthened(file):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="open files cannot be removed")
-@pytest.mark.parametrize("format", ["csv", "parquet", "mf4"])
+@pytest.mark.parametrize("format", file_formats.FILES)
 @pytest.mark.parametrize("change", [os.unlink, _truncated, _lengthened])
 def test_a_file_of_results_that_something_else_changes_during_the_run_fails_it(
     format, change, tmp_path, monkeypatch

@@ -1,4 +1,4 @@
-"""`yawbench list`: runs, scenarios, FMUs, vehicles, signals, metrics."""
+"""`yawbench list`: runs, scenarios, FMUs, vehicles, signals, metrics (tables: `studies.listings`)."""
 
 from __future__ import annotations
 

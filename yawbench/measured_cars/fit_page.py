@@ -16,7 +16,7 @@ from yawbench.measurements.measured_results import MeasuredResults
 from yawbench.metrics.expressions import MetricValue
 from yawbench.orchestrator.results.reader import Results
 from yawbench.reports.evaluation_page import drawn
-from yawbench.reports.page_parts import Document, render
+from yawbench.reports.page_parts import ViewerPage, render
 from yawbench.reports.viewer import LARGEST, Settings, assets, viewer
 from yawbench.reports.viewer_views import View
 from yawbench.studies.tables import Table
@@ -40,7 +40,7 @@ def fit_page(result: FitResult) -> str:
     if "acceleration_y" in names and len(names) > 1:
         others = [name for name in names if name != "acceleration_y"]
         views.append(View("over lateral acceleration", others, x="plant.acceleration_y"))
-    view = Document(
+    view = ViewerPage(
         title=result.fit.spec.title,
         sentence=f"{result.verdict[:1].upper()}{result.verdict[1:]}.",
         below=" · ".join(filter(None, (measurement.title, measurement.origin))),

@@ -1,4 +1,4 @@
-"""Parameters of scenarios fitted to measurements."""
+"""`fit` of the Python library: parameters of scenarios fitted to measurements."""
 
 from __future__ import annotations
 

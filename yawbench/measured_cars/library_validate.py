@@ -1,4 +1,4 @@
-"""Validation of runs by measurements."""
+"""`validate` of the Python library: runs compared with measurements."""
 
 from __future__ import annotations
 

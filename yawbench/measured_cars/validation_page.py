@@ -15,7 +15,7 @@ from yawbench.metrics.measures import words
 from yawbench.metrics.verdict import SYMBOLS, apart, worded
 from yawbench.orchestrator.results.reader import Results
 from yawbench.reports.evaluation_page import drawn
-from yawbench.reports.page_parts import Document, render
+from yawbench.reports.page_parts import ViewerPage, render
 from yawbench.reports.viewer import LARGEST, Settings, assets, viewer
 from yawbench.reports.viewer_views import Bound, View
 from yawbench.studies.tables import Table
@@ -49,9 +49,9 @@ def validation_page(validation: Validation) -> str:
     return render(replace(view, title=f"Validation: {validation.title}", assets=assets()))
 
 
-def validation_view(validation: Validation, name: str = "validation") -> Document:
+def validation_view(validation: Validation, name: str = "validation") -> ViewerPage:
     """Return what a page shows of a validation; `name`: anchor of its viewer."""
-    return Document(
+    return ViewerPage(
         title=f"{validation.title}, against {validation.measured}",
         sentence=validation_sentence(validation),
         warnings=[str(diagnostic) for diagnostic in validation.diagnostics],

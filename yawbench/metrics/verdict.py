@@ -14,19 +14,29 @@ import operator
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 Relation = Literal["above", "at_least", "below", "at_most"]
 """Relation that a number has to have to its bound."""
-SYMBOLS: dict[str, str] = {"above": ">", "at_least": "≥", "below": "<", "at_most": "≤"}
-"""Relation -> its symbol."""
-_COMPARE: dict[str, Callable[[float, float], bool]] = {
-    "above": operator.gt,
-    "at_least": operator.ge,
-    "below": operator.lt,
-    "at_most": operator.le,
+
+
+class RelationKind(NamedTuple):
+    """A relation: its symbol, when it holds, and on which side of the bound the number should be."""
+
+    symbol: str
+    holds: Callable[[float, float], bool]  # of number and bound
+    upwards: bool  # whether the number should be the larger one
+
+
+RELATIONS: dict[str, RelationKind] = {
+    "above": RelationKind(">", operator.gt, upwards=True),
+    "at_least": RelationKind("≥", operator.ge, upwards=True),
+    "below": RelationKind("<", operator.lt, upwards=False),
+    "at_most": RelationKind("≤", operator.le, upwards=False),
 }
-_UPWARDS = ("above", "at_least")
+"""To add a relation, add it here and to `Relation`, and a field to `studies.claim_schema.Condition`."""
+SYMBOLS = {name: kind.symbol for name, kind in RELATIONS.items()}
+"""Relation -> its symbol."""
 ROUNDING, MOST_DECIMALS = 1e-9, 12
 """Relative difference up to which numbers count as equal, and decimals at most."""
 
@@ -119,7 +129,8 @@ class Verdict(WithUnit):
         """Distance of the value beyond its bound, on the side where it should be, in its unit."""
         if self.value is None or self.bound is None:
             return None
-        return _beyond(self.value, self.bound, self.relation in _UPWARDS)
+        upwards = self.relation is not None and RELATIONS[self.relation].upwards
+        return _beyond(self.value, self.bound, upwards)
 
     @property
     def certain(self) -> bool:
@@ -163,8 +174,9 @@ def compare(
     """Compare a number with a bound in the same unit; not judged if either is missing."""
     if value is None or bound is None:
         return Verdict(Status.NOT_JUDGED, value, bound, relation, unit, why=why)
-    status = Status.PASSED if _COMPARE[relation](value, bound) else Status.FAILED
-    margin = _relative(_beyond(value, bound, relation in _UPWARDS), abs(bound) or abs(value))
+    kind = RELATIONS[relation]
+    status = Status.PASSED if kind.holds(value, bound) else Status.FAILED
+    margin = _relative(_beyond(value, bound, kind.upwards), abs(bound) or abs(value))
     return Verdict(status, value, bound, relation, unit, margin, half, why)
 
 

@@ -1,4 +1,4 @@
-"""Ranking of controllers under the conditions of the proving ground."""
+"""`rank` of the Python library: a ranking of controllers under the conditions of the proving ground."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ from yawbench.studies.result_tables import margin_words
 from yawbench.studies.tables import Table
 from yawbench.vocabulary.signals import SIGNALS
 
-from .page_parts import Document, render
+from .page_parts import ViewerPage, render
 from .viewer import LARGEST, MOST, Settings, assets, viewer
 from .viewer_views import Bound, Mark, View
 
@@ -102,7 +102,7 @@ def evaluation_page(
     settings = Settings(views, marks=marks, limits=limits, largest=LARGEST, comparable=series is None)
     instants, bounds = dashed[deciding[0]]
     told = [*(f"{instant:.3f} s: {text}" for instant, text in instants), *map(_limit_words, bounds)]
-    view = Document(
+    view = ViewerPage(
         title=f"{test.name.replace('-', ' ').capitalize()}: {counted(len(judged), 'run')}",
         below=f"{test.says[:1].upper()}{test.says[1:]}.",
         sentence=series.summary if series else _sentence(criteria, judged),

@@ -97,14 +97,14 @@ class Page(Part):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Document(Page):
+class ViewerPage(Page):
     """A page around a viewer.
 
     Attributes:
         many: tables of a section from which on they are folded. Chosen: more hide what comes after them.
     """
 
-    template = "document.html.j2"
+    template = "viewer_page.html.j2"
     viewer: Markup
     sentence: str = ""  # the result
     changed: str = ""  # overrides of the scenario that the title names

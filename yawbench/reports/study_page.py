@@ -59,7 +59,7 @@ from yawbench.studies.uncertainty import sample_tables
 
 from .comparison import ComparisonView
 from .diagram import diagram, systems_of
-from .page_parts import Document, FigureImage, Page, anchor, image_of
+from .page_parts import FigureImage, Page, ViewerPage, anchor, image_of
 from .provenance import ParameterGroup, count_kinds, fmus_of, groups_of, programs_of
 from .sweep_view import SWEEP_ASSETS, sweep_sentence, sweep_view, write_sides
 from .viewer import LARGEST, MOST, Carried, Settings, answer_of, assets, carried, embedded
@@ -143,7 +143,7 @@ class StudyPage(Page):
     grid: Sequence[str]  # algorithms, step sizes and stop times, with how many runs
     runs: int
     not_made: int
-    validations: Sequence[Document]  # of runs, by measured cars
+    validations: Sequence[ViewerPage]  # of runs, by measured cars
     fmus: Table
     programs: Mapping[str, str]
     comparison: ComparisonView | None = None  # metrics side by side, and where the runs part

@@ -22,6 +22,7 @@ from yawbench.foundation.errors import ResultsError
 from yawbench.foundation.messages import counted, listed
 from yawbench.metrics.expressions import metric
 from yawbench.metrics.measures import variable_of
+from yawbench.metrics.verdict import RELATIONS
 from yawbench.orchestrator.plan import Override
 from yawbench.orchestrator.results.reader import load_results
 from yawbench.orchestrator.results.run_record import RUN_FILE
@@ -255,7 +256,7 @@ def _chosen(findings: ExperimentResult) -> dict[str, Any]:
     spec = findings.spec
     limits: dict[str, dict[str, Any]] = {}
     bounds = [
-        (condition.metric, condition.bound, condition.relation in ("below", "at_most"))
+        (condition.metric, condition.bound, not RELATIONS[condition.relation].upwards)
         for limit in (*spec.limits.values(), *spec.probabilities.values())
         for condition in limit.holds_if
     ]

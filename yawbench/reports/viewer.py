@@ -41,7 +41,7 @@ from yawbench.orchestrator.results.reader import Results
 from yawbench.orchestrator.results.run_record import RunStatus
 from yawbench.orchestrator.scenario.overrides import with_changes
 
-from .page_parts import Assets, Document, Part, render, static, without_comments
+from .page_parts import Assets, Part, ViewerPage, render, static, without_comments
 from .planes import planes_of
 from .road import legend_of, notes_of, road_of, without_tyres
 from .viewer_data import PackedRun, is_numeric, pack
@@ -291,7 +291,7 @@ def page(runs: Sequence[LabelledRun], settings: Settings = SETTINGS, *, title: s
     """
     titles = list(dict.fromkeys(filter(None, (run.results.record.title for run in runs))))
     alone = with_changes(titles[0], runs[0].results.record.overrides) if titles and len(runs) == 1 else ""
-    view = Document(
+    view = ViewerPage(
         title=title or alone or _title(runs),
         sentence=answer_of(runs),
         below="" if alone else "; ".join(titles),
