@@ -1,4 +1,4 @@
-"""Pages on the papers: templates in `docs/generate/pages/`, numbers of recorded runs in `docs/papers.json`.
+"""Pages with numbers of studies, most on the papers: templates in `docs/generate/pages/`, numbers in `docs/papers.json`.
 
 A template is the page in Markdown, with each number as an expression (Jinja): `A["25mps/fnn"].error` is a
 metric of a run, `A.derived.grip_15` a number derived from several, `A.claim("on its path.")` a claim with its
@@ -51,7 +51,7 @@ STUDIES = {
     "D": "fuzzy_feedback/study",
 }
 """Name in templates -> study with a region, in the order of the report."""
-OTHERS = {"laws": "fnn_sideslip/laws"}
+OTHERS = {"laws": "fnn_sideslip/laws", "esc": "proving_ground/esc"}
 """Studies without claims on a paper, likewise."""
 DIGITS = 6
 """Significant digits of recorded numbers; chosen: pages show three."""
@@ -249,6 +249,7 @@ def pages_with_numbers() -> dict[Path, str]:
         **found, "studies": {name: found[name] for name in STUDIES}, "study_of": study_of, "kinds": KINDS,
         "levels_words": levels_words, "paths": STUDIES, "listed": listed, "totals": totals(found),
         "seeds": found_by_seeds(), "first_of": first_of, "tail": TAIL, "max": max, "min": min,
+        "braking_distance": lambda speed, friction: speed**2 / (2.0 * friction * G),
         "lifts": G * PaperA.track_width / (2.0 * PaperA.cg_height),
     }  # fmt: skip
     pages = {
