@@ -107,7 +107,10 @@ class ThreatSpec(OverrideSpec):
 
 
 class SettingSpec(OverrideSpec):
-    """Circumstances that are the same for all entries, in which all threats are searched."""
+    """Circumstances that are the same for all entries, in which all threats are searched.
+
+    What an entry brings with it, such as an allocator of its own, a setting leaves as it is.
+    """
 
     title: str = Field(min_length=1, description="Its words")
     limit: float | None = Field(None, gt=0.0, description="Moment limit of all [N.m]; default: each its own")
