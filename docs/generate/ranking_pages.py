@@ -13,7 +13,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
-from statistics import fmean, median
+from statistics import fmean, geometric_mean, median
 
 from yawbench.foundation.messages import in_text, listed
 from yawbench.ranking import ranking_page
@@ -174,6 +174,20 @@ class Threats:
     def levels(self, threat: str, entry: str) -> list[float]:
         """Return the levels of a threat that an entry survives, one for each car."""
         return [self.threats.spec.threats[threat].level(one.position) for one in self._levels(threat, entry)]
+
+    def mean_level(self, threat: str, entry: str) -> float:
+        """Return the level of a threat that an entry survives, geometric mean over cars."""
+        return geometric_mean(self.levels(threat, entry))
+
+    def more_robust(self, one: str, other: str, threat: str) -> str:
+        """Return which of two entries survives more of a threat."""
+        spec = self.threats.spec.threats[threat]
+        sign = 1.0 if spec.hard > spec.easy else -1.0
+        return max(one, other, key=lambda entry: sign * self.mean_level(threat, entry))
+
+    def differ(self, one: str, other: str) -> bool:
+        """Return whether two entries are clearly different."""
+        return one in self.scores.behind(other) or other in self.scores.behind(one)
 
     def _levels(self, threat: str, entry: str) -> list[Survived]:
         main = self.threats.main
