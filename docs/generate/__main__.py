@@ -18,15 +18,14 @@ from . import (
     evidence,
     fuzzy_sets,
     library,
-    matrix_tables,
     measured_car_tables,
     metrics,
     monitor_tables,
     papers,
+    ranking_pages,
     rooms,
     schemas,
     signals,
-    threat_tables,
     units,
     vehicles,
 )
@@ -50,7 +49,7 @@ PAGES: dict[str, Callable[[], str]] = {
 }
 """Path in the docs -> what returns its text."""
 PUBLISHED = (
-    blind_tables, car_tables, matrix_tables, measured_car_tables, monitor_tables, threat_tables
+    blind_tables, car_tables, measured_car_tables, monitor_tables, ranking_pages
 )  # fmt: skip
 """Modules of tables from published runs, which are parts of pages."""
 

@@ -1,9 +1,4 @@
-"""The matrix of docs/ranking.md from published cells: `python -m docs.generate.matrix_tables`.
-
-They come from scenarios/proving_ground/matrix.csv, every cell of `yawbench rank`, which `--runs TABLE` takes
-from the ranking's cells.csv, and from nuisance.csv and settings.csv, which it takes from beside that. It also
-writes docs/choosing.md.
-"""
+"""Tables of the matrix, nuisance and settings from published cells, for the pages on the ranking."""
 
 from __future__ import annotations
 
@@ -13,26 +8,23 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from yawbench.ranking import ranking_page
-from yawbench.ranking.nuisance import Nuisance, OrdinaryRun, nuisance_of, nuisance_sentence
+from yawbench.ranking.nuisance import Nuisance, OrdinaryRun, nuisance_of
 from yawbench.ranking.ranking import LoadedRanking, load_ranking
 from yawbench.ranking.ranking_scores import EntryScore, RankedState, RankingCell, RankingResult, placed
 from yawbench.ranking.ranking_tables import interval_words, sign_of
-from yawbench.ranking.settings import AS_IT_IS, SettingScores, settings_sentence
+from yawbench.ranking.settings import AS_IT_IS, SettingScores
 from yawbench.ranking.whole import WholeRanking, with_braking
 from yawbench.studies.confidence import ConfidenceInterval
 from yawbench.studies.jobs import STEP_TIME
 from yawbench.studies.tables import Table
 
-from .published import markdown, replaced, take, wrapped, write_pages
+from .published import take
 
 ROOT = Path(__file__).resolve().parents[2]
 FILE = ROOT / "scenarios" / "proving_ground" / "ranking.yaml"
 RUNS = FILE.parent / "matrix.csv"
 NUISANCE = FILE.parent / "nuisance.csv"
 SETTINGS = FILE.parent / "settings.csv"
-PAGE = ROOT / "docs" / "ranking.md"
-CHOOSING = ROOT / "docs" / "choosing.md"
 NOISY = "hard_sensors"
 """The condition whose seeds are told in a sentence."""
 TOLD = ("pid_tuned", "sliding_mode", "dead_band", "fnn")
@@ -199,35 +191,8 @@ def seeds_sentence(result: RankingResult) -> str:
     )
 
 
-def pages_with_tables() -> dict[Path, str]:
-    """Return the page with its tables written anew."""
-    result = published()
-    page = PAGE.read_text(encoding="utf-8")
-    for name, text in {
-        "first": wrapped(ranking_page.answer(result)),
-        "matrix": markdown(matrix(result)),
-        "means": f"{markdown(numbers(result))}\n\n{wrapped(seeds_sentence(result))}",
-    }.items():
-        page = replaced(page, name, text)
-    return {PAGE: page, CHOOSING: choosing(result)}
-
-
-def choosing(result: WholeRanking) -> str:
-    """Return the page for choosing a law: the answer and the tables beside the matrix."""
-    page = CHOOSING.read_text(encoding="utf-8")
-    parts = [wrapped(settings_sentence(result.settings))]
-    parts += [wrapped(nuisance_sentence(result.nuisance))] if result.nuisance else []
-    for table in ranking_page.beside_matrix(result):
-        parts += [f"## {table.title}", markdown(table)]
-    return replaced(page, "choosing", "\n\n".join(filter(None, parts)))
-
-
 def publish_beside(cells: Path) -> None:
     """Take the tables beside the cells of a ranking, if they are there."""
     for published_file, columns in BESIDE.items():
         if (table := cells.parent / published_file.name).is_file():
             take(table, published_file, columns)
-
-
-if __name__ == "__main__":
-    write_pages(__doc__, RUNS, COLUMNS, pages_with_tables, publish_beside)

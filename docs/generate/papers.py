@@ -1,4 +1,4 @@
-"""Pages on the papers: templates in `docs/generate/pages/`, numbers of recorded runs in `docs/papers.json`.
+"""Pages with numbers of studies, most on papers: templates in `pages/`, numbers in `docs/papers.json`.
 
 A template is the page in Markdown, with each number as an expression (Jinja): `A["25mps/fnn"].error` is a
 metric of a run, `A.derived.grip_15` a number derived from several, `A.claim("on its path.")` a claim with its
@@ -14,20 +14,13 @@ from __future__ import annotations
 import csv
 import fnmatch
 import json
-import math
-import re
-import textwrap
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any, NamedTuple
-
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from typing import NamedTuple
 
 from yawbench.components.cars.published_cars import PaperA
-from yawbench.figures.display import shown
-from yawbench.foundation.messages import listed
 from yawbench.metrics.verdict import Status, worded
 from yawbench.studies.axes import OpenValueSpec, VariantSpec, levels_of
 from yawbench.studies.confidence import TAIL, Bounds
@@ -38,10 +31,10 @@ from yawbench.studies.result_tables import NO_FLIP, flip_words, share, share_wor
 from yawbench.vocabulary.gravity import G
 
 from .published import replaced
+from .templates import reflowed, rendered, row, rule
 
 DOCS = Path(__file__).resolve().parents[1]
 SCENARIOS = DOCS.parent / "scenarios"
-TEMPLATES = Path(__file__).resolve().parent / "pages"
 FILE = DOCS / "papers.json"
 STUDIES = {
     "A": "fnn_sideslip/study",
@@ -51,7 +44,7 @@ STUDIES = {
     "D": "fuzzy_feedback/study",
 }
 """Name in templates -> study with a region, in the order of the report."""
-OTHERS = {"laws": "fnn_sideslip/laws"}
+OTHERS = {"laws": "fnn_sideslip/laws", "esc": "proving_ground/esc"}
 """Studies without claims on a paper, likewise."""
 DIGITS = 6
 """Significant digits of recorded numbers; chosen: pages show three."""
@@ -61,8 +54,6 @@ KINDS = tuple(
     worded(status, "claims") for status in (Status.PASSED, Status.FAILED, Status.SENSITIVE, Status.UNDECIDED)
 )
 """Verdicts in the order in which claims are listed."""
-WIDTH = 118
-"""Columns of a page's lines."""
 
 
 class Claim(NamedTuple):
@@ -240,21 +231,16 @@ def levels_words(name: str) -> str:
 def pages_with_numbers() -> dict[Path, str]:
     """Return the pages that have a template, and the sentences in others, written anew."""
     found = recorded()
-    environment = Environment(
-        loader=FileSystemLoader(TEMPLATES), undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True,
-        keep_trailing_newline=True,
+    pages = rendered(
+        "*.md.jinja",
+        {
+            **found, "studies": {name: found[name] for name in STUDIES}, "study_of": study_of, "kinds": KINDS,
+            "levels_words": levels_words, "paths": STUDIES, "totals": totals(found),
+            "seeds": found_by_seeds(), "first_of": first_of, "tail": TAIL,
+            "braking_distance": lambda speed, friction: speed**2 / (2.0 * friction * G),
+            "lifts": G * PaperA.track_width / (2.0 * PaperA.cg_height),
+        },
     )  # fmt: skip
-    environment.filters |= FILTERS
-    environment.globals |= {
-        **found, "studies": {name: found[name] for name in STUDIES}, "study_of": study_of, "kinds": KINDS,
-        "levels_words": levels_words, "paths": STUDIES, "listed": listed, "totals": totals(found),
-        "seeds": found_by_seeds(), "first_of": first_of, "tail": TAIL, "max": max, "min": min,
-        "lifts": G * PaperA.track_width / (2.0 * PaperA.cg_height),
-    }  # fmt: skip
-    pages = {
-        DOCS / file.stem: reflowed(environment.get_template(file.name).render())
-        for file in sorted(TEMPLATES.glob("*.md.jinja"))
-    }
     for page, name, text in sentences(found):
         pages[page] = replaced(
             pages.get(page) or page.read_text(encoding="utf-8"), name, reflowed(text).strip()
@@ -312,10 +298,10 @@ def sentences(found: Mapping[str, Numbers]) -> list[tuple[Path, str, str]]:
         "papers leave open, {} depend on it, {} are undecided"
     ).format(*every)
     lines = [
-        _row(("paper", "controlled variable and method", "claims", *KINDS)),
-        _rule(3 + len(KINDS), 1 + len(KINDS)),
+        row(("paper", "controlled variable and method", "claims", *KINDS)),
+        rule(3 + len(KINDS), 1 + len(KINDS)),
         *(
-            _row((f"[{paper.upper()}](theory/paper_{paper}.md)", PAPERS[paper][1], sum(counts), *counts))
+            row((f"[{paper.upper()}](theory/paper_{paper}.md)", PAPERS[paper][1], sum(counts), *counts))
             for paper, counts in counted.items()
         ),
     ]
@@ -344,59 +330,3 @@ def sentences(found: Mapping[str, Numbers]) -> list[tuple[Path, str, str]]:
             for paper, counts in counted.items()
         ),
     ]
-
-
-def reflowed(text: str) -> str:
-    """Return Markdown with paragraphs and items of lists in even lines; tables and code as they are."""
-    blocks, made = re.split(r"\n\n+", text), list[str]()
-    fenced = False
-    for block in blocks:
-        inside = fenced
-        fenced ^= bool(block.count("```") % 2)
-        if inside or "```" in block or block.startswith(("|", "#", "    ", "<", "![", ">")):
-            made.append(block)
-        else:
-            items = re.split(r"\n(?=- )", block)
-            made.append("\n".join(_wrapped(item) for item in items))
-    return "\n\n".join(made).rstrip() + "\n"
-
-
-def _wrapped(text: str) -> str:
-    indent = "  " if text.startswith("- ") else ""
-    return textwrap.fill(
-        " ".join(text.split()),
-        WIDTH,
-        subsequent_indent=indent,
-        break_on_hyphens=False,
-        break_long_words=False,
-    )
-
-
-def _per_cent(value: float, digits: int = 1) -> str:
-    return f"{100.0 * value:.{digits}f}"
-
-
-def _degrees(value: float, digits: int = 1) -> str:
-    return f"{math.degrees(value):.{digits}f}"
-
-
-def _number(value: float, digits: int = 2) -> str:
-    return f"{value:.{digits}f}"
-
-
-def _quantity(value: float, unit: str, digits: int = 3) -> str:
-    return shown(value, unit, digits=digits)
-
-
-def _row(cells: Iterable[Any]) -> str:
-    return f"| {' | '.join(map(str, cells))} |"
-
-
-def _rule(number: int, numbers: int = 0) -> str:
-    return "|" + "---|" * (number - numbers) + "---:|" * numbers
-
-
-FILTERS = {
-    "pc": _per_cent, "deg": _degrees, "num": _number, "quantity": _quantity, "row": _row, "rule": _rule,
-}  # fmt: skip
-"""How templates show numbers: in per cent, in degrees, as they are, with a unit; cells as a row."""

@@ -1,8 +1,7 @@
-"""The tables of threats in docs/ranking.md from published levels: `python -m docs.generate.threat_tables`."""
+"""Tables of threats from published levels, for the pages on the ranking."""
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 from yawbench.foundation.messages import listed
@@ -15,16 +14,14 @@ from yawbench.ranking.gains_and_laws import (
     gains_table,
     seeds_table,
 )
-from yawbench.ranking.threat_runs import ThreatResult, published_result
+from yawbench.ranking.threat_runs import ThreatResult
 from yawbench.ranking.threat_scores import ScoreTable, scored
-from yawbench.ranking.threats import load_threats
 from yawbench.studies.confidence import CONFIDENCE
 
-from .published import markdown, replaced, wrapped
+from .published import markdown, wrapped
 
 ROOT = Path(__file__).resolve().parents[2]
 FILE = ROOT / "scenarios" / "proving_ground" / "threats.yaml"
-PAGE = ROOT / "docs" / "ranking.md"
 
 
 def tables_text(result: ThreatResult) -> str:
@@ -84,14 +81,3 @@ def differences_sentences(result: ThreatResult, scores: ScoreTable, gains: Compa
         f"seen ({cars}), are clearly better than those of the study for {better[1]}, if corrected for the "
         f"{len(gains.means)} laws; each taken alone, for {better[0]}."
     )
-
-
-def pages_with_tables() -> dict[Path, str]:
-    """Return docs/ranking.md with its tables written anew."""
-    result = replace(published_result(load_threats(FILE)), published=frozenset())  # all of them are
-    return {PAGE: replaced(PAGE.read_text(encoding="utf-8"), "threats", tables_text(result))}
-
-
-if __name__ == "__main__":
-    for page, text in pages_with_tables().items():
-        page.write_text(text, encoding="utf-8")

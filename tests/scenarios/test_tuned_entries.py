@@ -70,11 +70,16 @@ def test_the_docs_tell_the_objective_of_every_law_the_least_first():
 @pytest.mark.exhaustive
 @pytest.mark.parametrize("law", ["LQR", "fuzzy feedback"])
 def test_the_objective_of_an_entry_is_what_its_runs_come_to(law, tmp_path):
-    text = (HERE / "tuning.yaml").read_text(encoding="utf-8").partition("\ntuning:")[0]
-    text = text.replace("sine_with_dwell.yaml", str(HERE / "sine_with_dwell.yaml"))
-    text = text.replace("../vehicles/", f"{SHIPPED}/vehicles/")
-    driven = f"swap: {{controller: {FOUND[law]['fmu']}}}, set: {json.dumps(changes(law))}"
-    (tmp_path / "again.yaml").write_text(re.sub(r"(- \{name: \S+/tuned, .*)\}", rf"\1, {driven}}}", text))
+    yaml = YAML(typ="safe")
+    file = yaml.load((HERE / "tuning.yaml").read_text(encoding="utf-8"))
+    del file["tuning"]
+    for run in file["runs"]:
+        run["scenario"], run["vehicle"] = (
+            str((HERE / run[key]).resolve()) for key in ("scenario", "vehicle")
+        )
+        if run["name"].endswith("/tuned"):
+            run |= {"swap": {"controller": FOUND[law]["fmu"]}, "set": {**run.get("set", {}), **changes(law)}}
+    yaml.dump(file, tmp_path / "again.yaml")
     with pytest.raises(SystemExit) as end:
         main(["study", str(tmp_path / "again.yaml"), "--out", str(tmp_path / "out"), "--jobs", "1"])
     assert not end.value.code

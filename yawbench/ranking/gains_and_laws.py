@@ -13,6 +13,7 @@ from yawbench.foundation.messages import in_text, listed
 from yawbench.studies.confidence import TAIL, Bounds, crossed_probability, holm, jackknife
 from yawbench.studies.tables import Table
 
+from .ranking import EntrySpec
 from .threat_runs import ThreatResult
 from .threat_scores import mean_positions
 
@@ -144,6 +145,10 @@ class ComparedGains:
     helped: dict[str, tuple[float, float]]
 
 
+def _law(entry: EntrySpec) -> tuple[str, dict[str, str]]:
+    return entry.fmu, entry.swap
+
+
 def compared_gains(result: ThreatResult) -> ComparedGains | None:
     """Compare gains and laws by the setting with seeds; None if there is none with all levels."""
     threats = result.threats
@@ -155,7 +160,7 @@ def compared_gains(result: ThreatResult) -> ComparedGains | None:
         name: [
             other
             for other in result.complete[setting]
-            if entries[other][0].fmu == entries[name][0].fmu and entries[other][0].gains == "tuned"
+            if entries[other][0].gains == "tuned" and _law(entries[other][0]) == _law(entries[name][0])
         ]
         for name in result.complete[threats.main]
         if entries[name][0].gains == "authors"

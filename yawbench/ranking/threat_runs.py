@@ -164,7 +164,9 @@ class _RunMaker:
             amplitude = side * amplitudes(self.angles[place.car])[-1]
             changes[Target.parse(AMPLITUDE)] = Override.of(AMPLITUDE, amplitude, "ranking")
         for part in (setting, spec.filled(attempt.position)):
-            changes |= _by_target(changes_of_file(part, threats.path.parent, "ranking"))
+            made = _by_target(changes_of_file(part, threats.path.parent, "ranking"))
+            brought = threats.ranking.entries[place.entry][0].swap if part is setting else ()
+            changes |= {target: one for target, one in made.items() if target.instance not in brought}
         changes |= _by_target(self._limited(place, scenario, changes))
         changes |= _by_target(self._scaled(place, scenario, spec, spec.level(attempt.position)))
         changes |= _by_target(repeat)
