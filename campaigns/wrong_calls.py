@@ -128,6 +128,16 @@ class Bench:
         return yb.RecordedRuns(Path(self.folder.name), {})
 
     @cached_property
+    def draws(self) -> yb.Runs:
+        axes = {"driver.amplitude": yb.uniform(0.02, 0.03)}
+        return yb.experiment(self.base, axes, metrics="peak(sideslip)", points=4, seed=1).run()
+
+    def stepped(self, call: Callable[[yb.SteppedRun], object]) -> object:
+        """Return what comes of a run that has been started."""
+        with self.base.start() as run:
+            return call(run)
+
+    @cached_property
     def places(self) -> yb.Ranking:
         return yb.rank(against=["none"], conditions=["hard"], quick=True)
 
@@ -331,6 +341,51 @@ def _parameters() -> Iterator[Parameter]:
     yield of("validate.file", lambda x: yb.validate(b.run, x), "file", "measurement", "loop.yaml")
     yield of("validate.bands", lambda x: yb.validate(b.run, f"{SENTINEL}.yaml", bands=x), "bands",
              "loop.yaml")  # fmt: skip
+    # Distributions.
+    for name, given in (("uniform", {"low": 1.0, "high": 2.0}), ("normal", {"mean": 1.0, "deviation": 0.1}),
+                        ("tabulated", {"values": [1.0, 2.0]})):  # fmt: skip
+        make, numbers = getattr(yb, name), (*given, "low", "high") if name == "normal" else [*given]
+        for one in dict.fromkeys(numbers):
+            yield of(f"{name}.{one}", lambda x, n=one, m=make, g=given: m(**{**g, n: x}), one, "low", "high",
+                     name, may={*FINITE, "None", "list", "tuple", "array of 1 dimension",
+                                "pair turned around"})  # fmt: skip
+        yield of(f"{name}.unit", lambda x, m=make, g=given: m(**g, unit=x), "unit", name, may=PRINTABLE | EMPTY)
+        yield of(f"{name}.whole", lambda x, m=make, g=given: m(**g, whole=x), "whole", name, right=TRUTHS)
+    yield of("uniform.log", lambda x: yb.uniform(1.0, 2.0, log=x), "log", "uniform", right=TRUTHS)
+    yield of("tabulated.shares", lambda x: yb.tabulated([1.0, 2.0], x), "shares", "tabulated",
+             may={"None", "list", "tuple", "array of 1 dimension", "pair turned around"})  # fmt: skip
+    drawn = {"driver.amplitude": yb.uniform(0.02, 0.03)}
+    for name, right in (
+        ("design", {"None"}), ("points", {"None", "three", "numpy uint8", "10**18"}),
+        ("seed", {"None", "zero", "three", "numpy uint8", "10**18"}),
+    ):  # fmt: skip
+        yield of(f"experiment.{name}", lambda x, n=name: yb.experiment(
+                 b.base, drawn, **{"points": 4, "seed": 1, n: x}), name, "design", "points", "axes",
+                 may=right)  # fmt: skip
+    bounds = ("below", "at_most", "above", "at_least")
+    yield of("Runs.probability.metric", lambda x: b.draws.probability(x, below=1.0), "metric", "metrics")
+    for name in bounds:
+        yield of(f"Runs.probability.{name}", lambda x, n=name: b.draws.probability("peak(sideslip)", **{n: x}),
+                 *bounds, "bound", may=FINITE)  # fmt: skip
+    yield of("Runs.to_latex.columns", lambda x: b.draws.to_latex(x), "columns", "column", right=NO_ITEMS,
+             may={"file", "frame"})  # fmt: skip
+    for name in ("caption", "label"):
+        yield of(f"Runs.to_latex.{name}", lambda x, n=name: b.draws.to_latex(**{n: x}), name,
+                 may={"None", *TEXTS})  # fmt: skip
+    # Steps.
+    yield of("SteppedRun.__getitem__.name", lambda x: b.stepped(lambda run: run[x]), "name", "variable")
+    yield of("SteppedRun.set.name", lambda x: b.stepped(lambda run: run.set(x, 1.0)), "name", "variable")
+    yield of("SteppedRun.set.value", lambda x: b.stepped(lambda run: run.set("plant.mass", x)), "value", "mass",
+             may=FINITE)  # fmt: skip
+    yield of("SteppedRun.step.steps", lambda x: b.stepped(lambda run: run.step(x)), "steps",
+             may={"three", "numpy uint8", "10**18", "zero"})  # fmt: skip
+    yield of("SteppedRun.run_to.time", lambda x: b.stepped(lambda run: run.run_to(x)), "time", may=FINITE)
+    yield of("SteppedRun.run_until.condition", lambda x: b.stepped(lambda run: run.run_until(x, 0.01)),
+             "condition", may={"lambda", "builtin", "class", "lambda of x", "lambda of all",
+                               "builtin type method"})  # fmt: skip
+    yield of("SteppedRun.run_until.time", lambda x: b.stepped(lambda run: run.run_until(lambda: True, x)),
+             "time", right={"None"}, may=FINITE)  # fmt: skip
+    yield of("SteppedRun.restore.state", lambda x: b.stepped(lambda run: run.restore(x)), "state")
     # Tunings.
     search = {"base": b.base, "ranges": {"driver.amplitude": (0.02, 0.03)}, "objective": SENTINEL}
     for name, taken in (

@@ -134,7 +134,7 @@ BROKEN: list[tuple[str | dict[str, Any], tuple[str | int, ...], Any]] = [
     (f"{A}/25mps", ("units", "plant", "fmu"), MISSING),
     (f"{A}/25mps", ("units", "plant", "fmu"), ""),
     (f"{A}/25mps", ("units", "plant", "paramters"), {}),
-    (f"{A}/25mps", ("units", "plant", "parameters"), {"mass": [1100]}),
+    (f"{A}/25mps", ("units", "plant", "parameters"), {"mass": {"of": 1100}}),
     (f"{A}/25mps", ("units", "plant", "tolerance"), 1),
     (f"{A}/25mps", ("units", "plant", "validate"), "no"),
     (f"{A}/25mps", ("units", "my plant"), {"fmu": "plant_seven_dof"}),

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.cars import make_plan
 from tests.changed import changed
 from tests.conftest import put_fmus
 from tests.fmus.fake_fmus import Var, make_fmu
@@ -20,7 +21,6 @@ from yawbench.orchestrator.master.simulate import simulate
 from yawbench.orchestrator.recordings.recording_formats import ColumnFile
 from yawbench.orchestrator.results.reader import load_results
 from yawbench.orchestrator.scenario.loader import load_scenario
-from yawbench.orchestrator.wiring.make_plan import make_plan
 
 cantools = pytest.importorskip("cantools")
 

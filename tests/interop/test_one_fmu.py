@@ -11,6 +11,7 @@ import pytest
 from fmpy import simulate_fmu
 from fmpy.validation import validate_fmu
 
+from tests.cars import make_plan
 from tests.changed import changed
 from tests.refusals import mentions
 from yawbench.cli import main
@@ -18,7 +19,6 @@ from yawbench.interop.second_opinion import Request, run_own
 from yawbench.interop.ssp_write import write_ssp
 from yawbench.orchestrator.results.reader import load_results
 from yawbench.orchestrator.scenario.loader import load_scenario
-from yawbench.orchestrator.wiring.make_plan import make_plan
 
 UNITS = (
     "driver_sine", "plant_seven_dof", "reference_steady_state", "controller_fnn",

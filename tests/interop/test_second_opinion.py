@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.cars import make_plan
 from tests.changed import changed
 from tests.evidence import measured
 from tests.interop import fmpy_exchanging
@@ -32,7 +33,6 @@ from yawbench.interop.second_opinion import (
 )
 from yawbench.orchestrator.master.simulate import simulate_in_memory
 from yawbench.orchestrator.scenario.loader import load_scenario
-from yawbench.orchestrator.wiring.make_plan import make_plan
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 PAPERS = {  # until the car moves as hard as in the whole run; the one with the fewest units first

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.cars import make_plan
 from tests.changed import changed
 from tests.conftest import build_here
 from tests.refusals import mentions
@@ -20,7 +21,6 @@ from yawbench.orchestrator.master.isolation import Isolation
 from yawbench.orchestrator.master.simulate import simulate
 from yawbench.orchestrator.results.reader import load_results
 from yawbench.orchestrator.scenario.loader import load_scenario
-from yawbench.orchestrator.wiring.make_plan import make_plan
 
 ROOT = Path(__file__).parents[2]
 CAR = ROOT / "scenarios" / "fnn_sideslip" / "25mps.yaml"
@@ -103,7 +103,7 @@ def test_units_end_when_the_master_is_killed(fmus, tmp_path):
         "import sys, os, signal; from pathlib import Path\n"
         "from yawbench.orchestrator.plan import Override\n"
         "from yawbench.orchestrator.scenario.loader import load_scenario\n"
-        "from yawbench.orchestrator.wiring.make_plan import make_plan\n"
+        "from tests.cars import make_plan\n"
         "from yawbench.orchestrator.master.isolation import Isolation\n"
         "from yawbench.orchestrator.master.simulate import simulate\n"
         f"short = [Override.of('stop_time', 0.01, 'test')]\n"

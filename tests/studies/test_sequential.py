@@ -11,9 +11,10 @@ import pytest
 
 from tests.checkout import ROOT
 from tests.markdown import table_in
-from yawbench.studies.axes import RegionSpec, hypercube
+from yawbench.studies.axes import RegionSpec
 from yawbench.studies.claims import ONE_IN
 from yawbench.studies.confidence import TAIL, Decision, SequentialTest, share_bounds
+from yawbench.studies.sampling import hypercube
 
 PAGE = ROOT / "docs" / "regions.md"
 CLAIMS = 1000
