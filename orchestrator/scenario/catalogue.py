@@ -145,6 +145,12 @@ def beside(file: Path, name: str, kind: str) -> Path:
     return next((found.absolute() for found in candidates if os.path.isfile(found)), path)
 
 
+def placed(folder: Path, name: str, kind: str) -> Path:
+    """Return the file that one in a folder names: the relative path as it is if it leads somewhere."""
+    path = folder / name
+    return path if os.path.exists(path) else beside(folder / "file", name, kind)
+
+
 def find(source: str | Path, kind: str) -> Path:
     """Find a file by its path, or by its name in a folder of scenarios.
 
