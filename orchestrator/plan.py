@@ -139,7 +139,8 @@ class Given(Generic[T]):
     where: Location = NOWHERE
     """For messages about it."""
     replaces: Given[T] | None = None
-    """The value of the file that an override replaces."""
+    """The value of the file that an override replaces; of a vehicle file like another one, that of the
+    latter, with the value None if it gives none."""
 
     @property
     def unit(self) -> str:

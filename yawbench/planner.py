@@ -12,7 +12,7 @@ from yawbench.fmus.opener import Building, Opener, report_to_stderr
 from yawbench.foundation.errors import ScenarioError
 from yawbench.foundation.messages import hint
 from yawbench.orchestrator.plan import Instance, Override, Plan
-from yawbench.orchestrator.scenario import yaml_lines
+from yawbench.orchestrator.scenario import like
 from yawbench.orchestrator.scenario.loader import LoadedScenario, load_scenario
 from yawbench.orchestrator.scenario.yaml_lines import Document
 from yawbench.orchestrator.signal_names import match
@@ -111,7 +111,7 @@ class Planner:
         return self._stiffnesses[key]
 
     def _read(self, path: Path, *, what: str) -> Document:
-        """Return what `yaml_lines.read` returns, for changes of its own."""
+        """Return what `like.read` returns, for changes of its own."""
         if path not in self._documents:
-            self._documents[path] = yaml_lines.read(path, what=what)
+            self._documents[path] = like.read(path, what=what)
         return self._documents[path].fresh()

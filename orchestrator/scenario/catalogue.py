@@ -38,6 +38,9 @@ HOMES = {"a vehicle file": "vehicles", "a file of bands": "bands"}
 """Kind of file -> its folder, which names may omit: `van` for `vehicles/van`."""
 MEASUREMENT = "a measurement file"
 _KEY = re.compile(rf"^[\"']?({'|'.join(KINDS)})[\"']?[ \t]*:", re.MULTILINE)
+_LIKE = re.compile(r"^[\"']?like[\"']?[ \t]*:[ \t]+([^\s#].*?)[ \t]*(?:#.*)?$", re.MULTILINE)
+MOST_ALIKE = 10
+"""Files followed from one to the file that it is like, when only its kind or title is asked. Chosen."""
 _TITLE = re.compile(r"^[\"']?title[\"']?[ \t]*:[ \t]+([^\s\[{&*!#].*(?:\n[ \t]+\S.*)*)", re.MULTILINE)
 """The entry of a text for the title, with the lines that continue it."""
 
@@ -53,20 +56,29 @@ def kind_of(path: Path) -> str:
     """Guess the kind of a file (`schema_validation.KINDS`) from its keys, unparsed; "" if unknown."""
     if path.suffix.lower() in (*ARCHIVES, FMU):
         return "a scenario"
-    try:
-        keys = _KEY.findall(read_bytes(path, largest=TEXT).decode("utf-8-sig"))
-    except (OSError, ValueError):
-        return ""
+    keys = {key for text in _texts(path) for key in _KEY.findall(text)}
     return next((kind for key, (kind, *_) in KINDS.items() if key in keys), "")
 
 
 def title_of(path: Path) -> str:
     """Return the title of a YAML file, whose other entries are not parsed; "" if it has none."""
-    try:
-        entry = _TITLE.search(read_bytes(path, largest=TEXT).decode("utf-8-sig"))
-    except (OSError, ValueError):
-        return ""
+    entry = next(filter(None, map(_TITLE.search, _texts(path))), None)
     return str(yaml_lines.scalar(entry[1]) or "") if entry else ""
+
+
+def _texts(path: Path) -> Iterator[str]:
+    """Yield the texts of a YAML file, of the file that it is like, and so on; none that cannot be read."""
+    for _ in range(MOST_ALIKE):
+        try:
+            text = read_bytes(path, largest=TEXT).decode("utf-8-sig")
+        except (OSError, ValueError):
+            return
+        yield text
+        if (like := _LIKE.search(text)) is None:
+            return
+        name = str(yaml_lines.scalar(like[1]))
+        found = (beside(path, name, kind) for kind in ("", *HOMES))
+        path = next(filter(os.path.isfile, found), path.parent / name)
 
 
 def files(folder: Path, kinds: Collection[str], *, depth: int | None = None) -> Iterator[tuple[Path, str]]:
@@ -121,6 +133,9 @@ def beside(file: Path, name: str, kind: str) -> Path:
     path = Path(os.path.normpath(file.parent / name))
     if Path(name).suffix in ENDINGS or os.path.exists(path):
         return path
+    near = (path.with_name(f"{path.name}{ending}") for ending in ENDINGS)
+    if found := next(filter(os.path.isfile, near), None):
+        return found
     candidates = (
         folder / home / f"{name}{ending}"
         for folder in folders()
@@ -128,6 +143,12 @@ def beside(file: Path, name: str, kind: str) -> Path:
         for ending in ENDINGS
     )
     return next((found.absolute() for found in candidates if os.path.isfile(found)), path)
+
+
+def placed(folder: Path, name: str, kind: str) -> Path:
+    """Return the file that one in a folder names: the relative path as it is if it leads somewhere."""
+    path = folder / name
+    return path if os.path.exists(path) else beside(folder / "file", name, kind)
 
 
 def find(source: str | Path, kind: str) -> Path:

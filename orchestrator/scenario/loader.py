@@ -13,7 +13,7 @@ from yawbench.foundation.messages import hint, listed
 from yawbench.foundation.safe_files import reads
 
 from ..plan import Override
-from . import overrides, quantities, schema_validation, yaml_lines
+from . import like, overrides, quantities, schema_validation, yaml_lines
 from .catalogue import ARCHIVES, FMU, beside
 from .schema import Connection, LoadedScenario, PropertyFile, ScenarioSpec, Vehicle, endpoint
 from .yaml_lines import Document, KeyPath
@@ -30,7 +30,7 @@ def load_scenario(
     *,
     changes: Sequence[Override] = (),
     data: dict[str, Any] | None = None,
-    read: Callable[..., Document] = yaml_lines.read,
+    read: Callable[..., Document] = like.read,
     read_tyre: Callable[[str], PropertyFile] | None = None,
     validate: bool = True,
 ) -> LoadedScenario:
@@ -40,7 +40,7 @@ def load_scenario(
         path: the YAML file, the FMU, or the archive; of an archive with variants also `system.ssp/other.ssd`.
         changes: overrides of the file; see `overrides`.
         data: its content, if there is no such file: messages name `path`.
-        read: reads a file, called like `yaml_lines.read`; the returned document is modified.
+        read: reads a file, called like `like.read`; the returned document is modified.
         read_tyre: reads a tyre property file; None: the scenario must not name any.
         validate: False: accept FMUs with invalid model descriptions.
 
@@ -56,6 +56,7 @@ def load_scenario(
     overrides.apply_vehicle(document, wanted)
     vehicle_document = _read_vehicle(document, read)
     replaced, effective = overrides.apply_changes(document, vehicle_document, wanted)
+    replaced = _swapped_by_likeness(document) | replaced
     if other and isinstance(document.data, dict) and (missing := other.missing_times(document)):
         raise ScenarioError(document.sorted_errors() + missing)
     if not validate:
@@ -82,6 +83,17 @@ def load_scenario(
         changes=effective,
         explicit=other is not None,
     )
+
+
+def _swapped_by_likeness(document: Document) -> dict[str, str]:
+    """Return instance -> its FMU in the file that this one is like, where it has another one here."""
+    first, instances = document.origin(), (document.data or {}).get("units") if document.like else None
+    before = {name: yaml_lines.at(first.data, ("units", name, "fmu")) for name in instances or ()}
+    return {
+        name: fmu
+        for name, fmu in before.items()
+        if isinstance(fmu, str) and fmu != yaml_lines.at(instances, (name, "fmu"))
+    }
 
 
 def _other_reader(path: Path) -> Any:

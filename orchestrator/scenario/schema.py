@@ -51,13 +51,14 @@ from ..signal_names import FAULTS, INPUTS, RESERVED, SignalName, Target, TargetK
 from .fault_schema import FaultSpec, location_of
 from .quantities import parse_unit
 from .schema_validation import Instant, OneOf, StrictModel, Time, in_unit
-from .yaml_lines import Document, KeyPath, put
+from .yaml_lines import Document, KeyPath, at, put
 
 if TYPE_CHECKING:
     from typing_extensions import Self
 
 AXLES = ("front", "rear")
 PARAMETERS = "parameters"
+LIKE_SAYS = "File of which everything is taken that this one does not change: its name or relative path"
 AlgorithmName = Annotated[str, OneOf(ALGORITHMS)]
 
 
@@ -183,9 +184,12 @@ def _placed(given: Given[Any], document: Document, of_file: str, *key: str | int
     The source of a value is in the comment on it, else in that above its instance, else that of the file.
     """
     of_vehicle = key[0] == PARAMETERS
+    holder, _ = document.holder(key)
+    if holder is not document:
+        of_file = str(at(holder.data, ("source",)) or "")
     of_others = (document.comment_above(key[:2]) if key[0] == "units" else "") or of_file
     comment = document.comment(key) or ("" if of_vehicle else of_others)
-    about = comment, of_file, str(document.path), document.lines.get(key, 0)
+    about = comment, of_file, str(holder.path), holder.lines.get(key, 0)
     return replace(given, origin=_origin(of_vehicle, *about), where=document.location(key))
 
 
@@ -328,6 +332,7 @@ GivenScalar = Annotated[Given[Scalar], _AsGiven()]
 class Vehicle(StrictModel):
     """A vehicle file: parameters for every instance that declares them."""
 
+    like: str = Field("", description=LIKE_SAYS, min_length=1)
     title: str = ""
     source: str = ""
     tyres: Tyres | None = Field(
@@ -341,6 +346,10 @@ class Vehicle(StrictModel):
             name: _placed(given, document, self.source, PARAMETERS, name)
             for name, given in self.parameters.items()
         }
+        first = document.origin()
+        for name in placed if first is not document else ():
+            if document.holder((PARAMETERS, name))[0] is not first:  # a change, as an override is one
+                placed[name] = replace(placed[name], replaces=Given(at(first.data, (PARAMETERS, name))))
         return self.model_copy(update={PARAMETERS: placed})
 
     @property
@@ -361,6 +370,7 @@ class ScenarioSpec(StrictModel):
     inputs, parameters, local variables, text.
     """
 
+    like: str = Field("", description=LIKE_SAYS, min_length=1)
     title: str = ""
     source: str = Field("", description="Where the scenario comes from: paper, section, figure")
     vehicle: str | None = Field(None, description="Path of a vehicle file")
@@ -385,18 +395,18 @@ class ScenarioSpec(StrictModel):
     def placed(self, document: Document) -> Self:
         """Return the scenario with the origins and places of its values."""
 
-        def at(given: Given[Any], *key: str | int) -> Given[Any]:
+        def place(given: Given[Any], *key: str | int) -> Given[Any]:
             return _placed(given, document, self.source, *key)
 
         def all_at(values: Mapping[str, Given[Any]], *key: str) -> dict[str, Given[Any]]:
-            return {name: at(given, *key, name) for name, given in values.items()}
+            return {name: place(given, *key, name) for name, given in values.items()}
 
         units = {
             name: put(unit, [PARAMETERS], all_at(unit.parameters, "units", name, PARAMETERS))
             for name, unit in self.units.items()
         }
-        facts = {name: at(given, name) for name in FACTS if (given := getattr(self, name)) is not None}
-        faults = [at(given, FAULTS, i) for i, given in enumerate(self.faults)]
+        facts = {name: place(given, name) for name in FACTS if (given := getattr(self, name)) is not None}
+        faults = [place(given, FAULTS, i) for i, given in enumerate(self.faults)]
         inputs = all_at(self.inputs, INPUTS)
         return self.model_copy(update={**facts, "units": units, INPUTS: inputs, FAULTS: faults})
 

@@ -55,6 +55,8 @@ class Document:
     """Diagnostics that are not errors, for the plan."""
     accepted: dict[type, tuple[Any, Any]] = field(default_factory=dict)
     """Schema -> the data that it has accepted last, and their content."""
+    like: Document | None = None
+    """The file that this one is like (`like`), with the lines of what is taken from it."""
 
     def fresh(self) -> Document:
         """Return a document with the same content, and overrides, errors and notes of its own."""
@@ -84,8 +86,23 @@ class Document:
         change = self.override(key)
         if change is not None:
             return Location(target=str(change))
-        line = next((self.lines[key[:n]] for n in range(len(key), -1, -1) if key[:n] in self.lines), 1)
-        return Location(file=self.path, line=line, target=dotted(key))
+        holder, line = self.holder(key)
+        return Location(file=holder.path, line=line, target=dotted(key))
+
+    def holder(self, key: KeyPath) -> tuple[Document, int]:
+        """Return the file, this or one that it is like, and the line of a value, or of what holds it."""
+        holder, length = self._holder(key)
+        return holder, holder.lines.get(key[:length], 1)
+
+    def _holder(self, key: KeyPath) -> tuple[Document, int]:
+        """Return the file that holds the most of a key, and how much."""
+        length = next((n for n in range(len(key), -1, -1) if key[:n] in self.lines), 0)
+        of_other = self.like._holder(key) if self.like is not None else (self, 0)
+        return of_other if of_other[1] > length else (self, length)
+
+    def origin(self) -> Document:
+        """Return the file that this one is like in the end; itself if it is like none."""
+        return self if self.like is None else self.like.origin()
 
     def override(self, key: KeyPath) -> Override | None:
         """Return the override that set the value at `key`, None if it is from the file."""
@@ -96,14 +113,16 @@ class Document:
 
     def comment(self, key: KeyPath) -> str:
         """Return the comment on the line of a key, "" if there is none."""
-        return self.comments.get(self.lines.get(key, 0), "")
+        holder, _ = self.holder(key)
+        return holder.comments.get(holder.lines.get(key, 0), "")
 
     def comment_above(self, key: KeyPath) -> str:
         """Return the comment lines right above a key."""
-        line = self.lines.get(key, 0) - 1
+        holder, _ = self.holder(key)
+        line = holder.lines.get(key, 0) - 1
         lines: list[str] = []
-        while line in self.comment_lines:
-            lines.insert(0, self.comment_lines[line])
+        while line in holder.comment_lines:
+            lines.insert(0, holder.comment_lines[line])
             line -= 1
         return " ".join(lines)
 

@@ -75,6 +75,28 @@ def test_a_cell_tells_how_sure_the_mean_over_its_seeds_is():
     assert RankingCell("x", "c", [driven(), driven(6.0)]).headroom.half == 0.0
 
 
+def test_a_ranking_names_scenarios_and_cars_as_the_command_line_does(tmp_path):
+    text = (GROUND / "ranking.yaml").read_text(encoding="utf-8")
+    cars = text.replace("vehicle: ../vehicles/hard.yaml", "vehicle: hard")
+    named = cars.replace(
+        "slow_steer: slowly_increasing_steer.yaml", "slow_steer: proving_ground/slowly_increasing_steer"
+    )
+    assert named != cars != text
+    (tmp_path / "ranking.yaml").write_text(named, encoding="utf-8")
+    for file in GROUND.glob("tuned*.yaml"):
+        (tmp_path / file.name).write_text(file.read_text(encoding="utf-8"), encoding="utf-8")
+    made, shipped = load_ranking(tmp_path / "ranking.yaml"), load_ranking(GROUND / "ranking.yaml")
+    slow = made.scenario(made.spec.cars["hard"].slow_steer)
+    assert slow.resolve() == shipped.scenario(shipped.spec.cars["hard"].slow_steer).resolve()
+    vehicles = [
+        Path(str(change.value)).resolve()
+        for one in (made, shipped)
+        for change in one.changes(one.spec.cars["hard"])
+        if change.target.kind == "vehicle_file"
+    ]
+    assert vehicles == [ROOT / "scenarios/vehicles/hard.yaml"] * 2
+
+
 def test_places_go_by_conditions_passed_then_runs_then_sideslip():
     bad = driven(stability=0.0)
     every = [

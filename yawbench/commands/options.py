@@ -70,6 +70,34 @@ def completing_names(*of: str) -> Callable[[str], list[str]]:
     return complete
 
 
+def complete_swap(incomplete: str) -> list[str]:
+    """Complete INSTANCE=FMU: instances by the names of roles, then the FMUs of the role."""
+    from yawbench.fmus.opener import Opener, find_folder
+    from yawbench.vocabulary.roles import ROLES
+
+    instance, equals, _ = incomplete.partition("=")
+    if not equals:
+        return [f"{role.name}=" for role in ROLES.values() if role.name.startswith(instance)]
+    opener = Opener()
+    known = opener.names(find_folder(Path("scenario.yaml"), opener=opener))
+    fmus = [name for name in known if name.startswith(f"{instance}_")]
+    return [text for name in fmus if (text := f"{instance}={name}").startswith(incomplete)]
+
+
+def complete_fault(incomplete: str) -> list[str]:
+    """Complete TARGET: KIND: instances by the names of roles, their signals, then the kinds."""
+    from yawbench.vocabulary.roles import ROLES
+    from yawbench.vocabulary.signals import SIGNALS
+
+    target, colon, _ = incomplete.partition(":")
+    if colon:
+        return [text for kind in KINDS if (text := f"{target}: {kind}").startswith(incomplete)]
+    instance, dot, _ = target.partition(".")
+    if not dot:
+        return [f"{role.name}." for role in ROLES.values() if role.name.startswith(instance)]
+    return [text for name in SIGNALS if (text := f"{instance}.{name}").startswith(target)]
+
+
 def _refuse_of_car(settings: Iterable[str]) -> None:
     """Refuse quantities of the car without the word before them, as `mass` of `vehicle.mass`.
 
@@ -133,6 +161,7 @@ class RunOptions:
         typer.Option(
             "--swap",
             metavar="INSTANCE=FMU",
+            autocompletion=complete_swap,
             help="Replace the FMU of an instance, by name or path. Repeatable.",
         ),
     ] = None
@@ -151,6 +180,7 @@ class RunOptions:
         typer.Option(
             "--fault",
             metavar="'TARGET: KIND VALUE'",
+            autocompletion=complete_fault,
             help="Inject a fault, such as 'plant.yaw_rate -> sensor: freeze from 2 s until 3 s'; "
             "target: INSTANCE.OUTPUT, INSTANCE.OUTPUT -> INSTANCE or INSTANCE.INPUT; "
             f"kind: {', '.join(KINDS)}; {NO_FAULTS} removes the scenario's own. Repeatable.",

@@ -45,7 +45,15 @@ def kinds() -> list[str]:
 
 def schema_of(kind: str) -> dict[str, Any]:
     """Return the JSON Schema of files of a kind."""
+    from yawbench.orchestrator.scenario.like import LIKE
+
     made = model_of(kind).model_json_schema(schema_generator=_Generator)
+    if LIKE in made["properties"]:  # what such a file lacks may be in the other one
+        whole: dict[str, Any] = {key: made.pop(key) for key in ("required", "oneOf") if key in made}
+        if (instance := made.get("$defs", {}).get("InstanceSpec")) is not None:
+            needed = {"additionalProperties": {"required": instance.pop("required")}}
+            whole["properties"] = {"units": needed}
+        made |= {"if": {"required": [LIKE]}, "else": whole}
     return {"$schema": DIALECT, **made, "title": f"yawbench {kind} file"}
 
 

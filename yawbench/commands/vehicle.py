@@ -62,7 +62,7 @@ def vehicle(
     frequency and damping over speed.
     """
     from yawbench.orchestrator.results.folder_names import below_results
-    from yawbench.orchestrator.scenario import catalogue, yaml_lines
+    from yawbench.orchestrator.scenario import catalogue, like
     from yawbench.orchestrator.scenario.schema import Vehicle
     from yawbench.orchestrator.scenario.schema_validation import validated
     from yawbench.planner import Planner
@@ -70,7 +70,7 @@ def vehicle(
     from yawbench.vehicles.suspicious_values import suspicious_vehicle
 
     file = catalogue.find(file, "a vehicle file")
-    document = yaml_lines.read(file, what="vehicle file")
+    document = like.read(file, what="vehicle file")
     spec = validated(Vehicle, document)
     for warning in suspicious_vehicle(spec.values):
         say(f"note: {warning}")

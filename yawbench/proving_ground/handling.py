@@ -31,7 +31,7 @@ from yawbench.foundation.errors import ModelDescriptionError, SimulationError, W
 from yawbench.orchestrator.master.simulate import simulate_in_memory
 from yawbench.orchestrator.plan import Plan
 from yawbench.orchestrator.results.reader import Results
-from yawbench.orchestrator.scenario import yaml_lines
+from yawbench.orchestrator.scenario import like
 from yawbench.planner import Planner
 from yawbench.tyre_stand import KNOWN_BY, open_role
 from yawbench.vocabulary.roles import role_in
@@ -97,7 +97,7 @@ class TestTrack:
     @cached_property
     def tyres(self) -> str:
         """The tyres' FMU: as given, or the FMU that takes the file's tyre property files or stiffness."""
-        data = yaml_lines.read(self.vehicle, what="vehicle file").data
+        data = like.read(self.vehicle, what="vehicle file").data
         content = data if isinstance(data, dict) else {}
         if self.tyre or content.get("tyres"):
             return self.tyre or "tyre_magic_formula_62"

@@ -192,7 +192,7 @@ def nuisance_experiment(
                 changes = (*changes, Override.of(AMPLITUDE, amplitude, "ranking"))
             places[key] = name, car
             title = f"{spec.title}, {car}"
-            runs.append(NamedRun(key, title, title, ranking.path.parent / spec.scenario, changes))
+            runs.append(NamedRun(key, title, title, ranking.scenario(spec.scenario), changes))
             levels = [
                 [Level(value, values[value]) for value in spec.repeats.get(place, [*values][:1])]
                 for place, values in repeated.items()

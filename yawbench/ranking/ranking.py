@@ -42,7 +42,7 @@ from yawbench.foundation.safe_files import reads
 from yawbench.metrics.expressions import TimeWindow
 from yawbench.metrics.verdict import NotJudged
 from yawbench.orchestrator.plan import Override, Plan
-from yawbench.orchestrator.scenario import yaml_lines
+from yawbench.orchestrator.scenario import catalogue, yaml_lines
 from yawbench.orchestrator.scenario.schema import Scalar
 from yawbench.orchestrator.scenario.schema_validation import StrictModel, Time, made, validated
 from yawbench.orchestrator.signal_names import Target
@@ -266,6 +266,10 @@ class LoadedRanking(LoadedFile):
             *(change for part in parts for change in changes_of_file(part, self.path.parent, "ranking")),
         )
 
+    def scenario(self, name: str) -> Path:
+        """Return the scenario that the file names."""
+        return catalogue.placed(self.path.parent, name, "a scenario")
+
     def variant(self, name: str) -> VariantSpec:
         """Return an entry as a level of an axis: its controller is put into a scenario."""
         spec, folder = self.entries[name]
@@ -365,7 +369,7 @@ def angle_experiment(
     runs = []
     for name in ranking.cars if cars is None else cars:
         car = ranking.spec.cars[name]
-        scenario, changes = ranking.path.parent / car.slow_steer, ranking.changes(car, stop=False)
+        scenario, changes = ranking.scenario(car.slow_steer), ranking.changes(car, stop=False)
         runs.append(NamedRun(name, car.title, car.title, scenario, changes, (SLOW, None)))
     steer_amplitudes = [
         slow_steer_amplitude(plan, run.scenario) for run, plan in zip(runs, execute.plans(runs), strict=True)
@@ -419,7 +423,7 @@ def dwell_experiment(
     """
     runs, repeated = [], dict[str, dict[Any, str]]()
     for name, condition in ranking.conditions.items():
-        scenario, test = ranking.path.parent / condition.scenario, (SERIES, angles[condition.car])
+        scenario, test = ranking.scenario(condition.scenario), (SERIES, angles[condition.car])
         changes = ranking.changes_of_condition(name)
         runs.append(NamedRun(name, condition.title, condition.title, scenario, changes, test))
         for place, values in condition.repeats.items():

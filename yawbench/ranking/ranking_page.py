@@ -373,7 +373,7 @@ def series_command(ranked: RankingResult, cell: RankingCell) -> str:
     ranking = ranked.ranking
     condition = ranking.spec.conditions[cell.condition]
     words = ["yawbench", "drive", "sine-with-dwell", "--figures"]
-    words += ["--scenario", str(ranking.path.parent / condition.scenario)]
+    words += ["--scenario", str(ranking.scenario(condition.scenario))]
     words += ["--angle", f"{math.degrees(ranked.angles[condition.car]):.1f} deg"]
     changes = {
         change.target: change

@@ -43,7 +43,7 @@ from yawbench.foundation.errors import ScenarioError
 from yawbench.foundation.messages import hint
 from yawbench.foundation.safe_files import reads
 from yawbench.orchestrator.plan import Override
-from yawbench.orchestrator.scenario import yaml_lines
+from yawbench.orchestrator.scenario import catalogue, yaml_lines
 from yawbench.orchestrator.scenario.schema import Scalar
 from yawbench.orchestrator.scenario.schema_validation import StrictModel, validated
 from yawbench.orchestrator.signal_names import Target
@@ -264,7 +264,8 @@ class LoadedThreats(LoadedFile):
 
     def scenario(self, car: str, name: str) -> Path:
         """Return a scenario, or that in its place for a car."""
-        return self.path.parent / self.spec.scenarios.get(car, {}).get(name, name)
+        named = self.spec.scenarios.get(car, {}).get(name, name)
+        return catalogue.placed(self.path.parent, named, "a scenario")
 
     def variants(self, threat: ThreatSpec) -> list[tuple[int, tuple[Override, ...]]]:
         """Return side (1: left first) and overrides of the repeats of all runs of a level."""
@@ -295,7 +296,7 @@ def load_threats(
     spec = validated(ThreatsSpec, yaml_lines.read(path, what="threat file"))
     if quick:
         spec = spec.model_copy(update={"settings": dict([*spec.settings.items()][:1])})
-    ranking = load_ranking(path.parent / spec.ranking, more=more)
+    ranking = load_ranking(catalogue.placed(path.parent, spec.ranking, "a ranking file"), more=more)
     for name in spec.cars:
         if name not in ranking.spec.cars:
             raise ScenarioError(

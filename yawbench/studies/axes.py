@@ -21,7 +21,7 @@ from pydantic import ConfigDict, Field, PlainSerializer, PlainValidator, WithJso
 from yawbench.fmus.fmu import Value
 from yawbench.foundation.messages import resolved, short
 from yawbench.orchestrator.plan import Override, OverrideOrigin
-from yawbench.orchestrator.scenario import overrides, yaml_lines
+from yawbench.orchestrator.scenario import catalogue, overrides, yaml_lines
 from yawbench.orchestrator.scenario.fault_schema import FaultSpec, by_location
 from yawbench.orchestrator.scenario.quantities import parse_unit
 from yawbench.orchestrator.scenario.schema import AlgorithmName, Scalar
@@ -481,7 +481,9 @@ def changes_at(
 ) -> list[Override]:
     """Return the overrides of one level of an axis; file names are relative to `folder`."""
     if axis.kind == "file":
-        return [Override(axis.vary[0], str(folder / str(level.value)), origin)]
+        of_car = axis.vary[0].kind == "vehicle_file"
+        file = _vehicle(folder, str(level.value), origin).value if of_car else folder / str(level.value)
+        return [Override(axis.vary[0], str(file), origin)]
     if axis.kind == "variant":
         return changes_of_file(axis.variants[str(level.value)], folder, origin)
     if axis.kind == "fmu":
@@ -496,9 +498,13 @@ def _given(axis: AxisSpec, level: Level) -> Value:
     return yaml_lines.scalar(level.value) if isinstance(level.value, str) else level.value
 
 
+def _vehicle(folder: Path, name: str, origin: OverrideOrigin) -> Override:
+    return Override.of(VEHICLE, str(catalogue.placed(folder, name, "a vehicle file")), origin)
+
+
 def changes_of_file(spec: OverrideSpec, folder: Path, origin: OverrideOrigin) -> list[Override]:
     """Return the overrides in one part of an experiment file; file names are relative to `folder`."""
-    vehicle = [Override.of(VEHICLE, str(folder / spec.vehicle), origin)] if spec.vehicle else []
+    vehicle = [_vehicle(folder, spec.vehicle, origin)] if spec.vehicle else []
     of_run = overrides.changes_of_run(spec, origin)
     at = by_location(entry.fault for entry in spec.faults)
     faults = [

@@ -19,7 +19,7 @@ from yawbench.foundation.errors import ScenarioError
 from yawbench.foundation.messages import hint, short
 from yawbench.foundation.safe_files import reads
 from yawbench.orchestrator.plan import Override
-from yawbench.orchestrator.scenario import catalogue, yaml_lines
+from yawbench.orchestrator.scenario import catalogue, like, yaml_lines
 from yawbench.orchestrator.scenario.schema_validation import validated
 from yawbench.orchestrator.scenario.yaml_lines import Document, KeyPath
 from yawbench.orchestrator.signal_names import Target
@@ -85,7 +85,7 @@ def load_experiment(path: Path | str, *, changes: Sequence[Override] = ()) -> Lo
         ScenarioError: the file is invalid; lists all errors.
     """
     path = Path(path)
-    document = yaml_lines.read(path, what="experiment file")
+    document = like.read(path, what="experiment file")
     spec = validated(ExperimentFile, document)
     spec = with_tables(expanded(spec, document), document)
     runs = (

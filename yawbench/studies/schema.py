@@ -162,7 +162,7 @@ from pydantic import BeforeValidator, ConfigDict, Field, WithJsonSchema, model_v
 
 from yawbench.figures.plots import OVERVIEW
 from yawbench.foundation.messages import listed
-from yawbench.orchestrator.scenario.schema import Scalar
+from yawbench.orchestrator.scenario.schema import LIKE_SAYS, Scalar
 from yawbench.orchestrator.scenario.schema_validation import OneOf, StrictModel, exactly_one
 from yawbench.orchestrator.scenario.yaml_lines import KeyPath
 
@@ -387,6 +387,7 @@ class ExperimentSpec(OverrideSpec):
 
     model_config = ConfigDict(json_schema_extra=exactly_one("scenario", "runs"))
 
+    like: str = Field("", description=LIKE_SAYS, min_length=1)
     title: str = Field(min_length=1)
     source: str = Field(
         "", description="The paper, with all that is needed to find it, or whose question it is"

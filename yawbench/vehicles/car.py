@@ -171,10 +171,15 @@ class CarParameters(Parameters):
 
     def _adapted(self, given: Mapping[str, float]) -> dict[str, float]:
         """Return the vehicle file's quantities after changes, with those that follow; note them."""
-        before, changed = {**given}, [name for name in given if self._of_car[name].changed]
+        own = self._of_car
+        before = {**given}
+        changed = [name for name in given if own[name].changed or own[name].replaces is not None]
         for name in changed:
             del before[name]
-            if (replaced := self._of_car[name].replaces) is not None:
+            replaced = own[name].replaces
+            while replaced is not None and replaced.replaces is not None:
+                replaced = replaced.replaces
+            if replaced is not None and replaced.value is not None:
                 with suppress(ValueError):  # of a value that is not valid
                     before[name] = float(value_for(quantity_of(name), replaced.value))
         after, notes = adapted(given, before, changed)
