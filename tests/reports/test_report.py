@@ -308,6 +308,8 @@ def test_several_studies_make_one_page_with_an_overview(overview):
     assert texts(tree, "section > h2") == titles
     claims = len(tree.cssselect("ol.plain > li"))
     assert tree.xpath("string(//p[@class='said'])").startswith(f"Of {claims} claims in 3 studies, ")
+    assert texts(tree, "table.papers tbody th") == titles
+    assert len(tree.cssselect("table.papers tbody .verdict")) == claims
     for title, link in zip(titles, tree.cssselect("section > h2 > a"), strict=True):
         page = overview.folder / link.get("href")
         study = html.fromstring(unpacked(page))
