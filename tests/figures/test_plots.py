@@ -10,7 +10,7 @@ import pytest
 from tests.orchestrator.recorded import car, noted, results
 from tests.refusals import each_mentions, mentions, refused
 from yawbench.figures.panels import LabelledRun, check_panels, thinned
-from yawbench.figures.plots import draw, provenance, title_of
+from yawbench.figures.plots import draw, minus, provenance, title_of
 from yawbench.figures.style import LINES, save
 from yawbench.foundation.errors import ResultsError, ScenarioError
 from yawbench.foundation.messages import printable
@@ -90,7 +90,18 @@ def test_runs_with_references_of_their_own_show_each_in_the_runs_colour():
     figure = draw([SEVERAL[1], LabelledRun("slow", slow)], ["sideslip"])
     pale = [line for line in panel(figure, "sideslip").get_lines() if line.get_label() == "reference"]
     assert [line.get_color() for line in pale] == [LINES[0]["color"], LINES[1]["color"]]
-    assert mentions(legend(figure)[-1], "wide", "pale", "reference")
+    assert mentions(legend(figure)[-1], "wide", "reference")
+
+
+def test_a_difference_is_of_each_other_run_without_references_also_at_equal_speeds():
+    _, fuzzy, neural = SEVERAL
+    apart = minus(SEVERAL, fuzzy)
+    figure = draw(apart, ["sideslip"])
+    assert legend(figure) == ["no control minus fuzzy", "neural minus fuzzy"]
+    _, line = panel(figure, "sideslip").get_lines()
+    wanted = neural.results["plant.sideslip"] - fuzzy.results["plant.sideslip"]
+    assert np.asarray(line.get_ydata()) == pytest.approx(np.degrees(wanted), nan_ok=True)
+    assert np.isfinite(line.get_ydata()).all()
 
 
 def test_an_angle_that_passes_half_a_turn_is_not_joined_across_the_panel():
@@ -126,7 +137,7 @@ def test_a_lost_car_leaves_the_axes_and_the_figure_says_so():
     figure = draw([LabelledRun("lost", car(40.0)), LabelledRun("held", car(1.1))], ["sideslip"])
     axes = panel(figure, "sideslip")
     assert axes.get_ylim()[1] < 3 * np.degrees(1.1 * 0.6 * 0.03)
-    assert each_mentions([text.get_text() for text in axes.texts], ("41.3 °", "lost"))
+    assert each_mentions([text.get_text() for text in axes.texts], ("41.3\N{NO-BREAK SPACE}°", "lost"))
 
 
 def test_a_car_beyond_a_tiny_reference_stays_in_the_axes_with_another_that_is():

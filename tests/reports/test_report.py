@@ -306,8 +306,10 @@ def test_several_studies_make_one_page_with_an_overview(overview):
     tree = html.fromstring(unpacked(overview.folder / "report.html"))
     titles = ["A paper before", "A paper before, more", "Half a paper"]
     assert texts(tree, "section > h2") == titles
-    claims = len(tree.cssselect("ul.plain > li"))
+    claims = len(tree.cssselect("ol.plain > li"))
     assert tree.xpath("string(//p[@class='said'])").startswith(f"Of {claims} claims in 3 studies, ")
+    assert texts(tree, "table.papers tbody th") == titles
+    assert len(tree.cssselect("table.papers tbody .verdict")) == claims
     for title, link in zip(titles, tree.cssselect("section > h2 > a"), strict=True):
         page = overview.folder / link.get("href")
         study = html.fromstring(unpacked(page))
@@ -330,7 +332,7 @@ def test_a_claim_of_the_overview_shows_its_runs_from_the_side_file_of_its_study(
     chromium.wait_for("document.querySelector('.choosing').dataset.shown === 'whole-study'")
     chromium.wait_for("document.querySelector('.chosen .yv-ready')")
     assert chromium.run("return document.querySelectorAll('*').length") <= 2000
-    links = chromium.run("return [...document.querySelectorAll('ul.plain a')].map((one) => one.hash)")
+    links = chromium.run("return [...document.querySelectorAll('ol.plain a')].map((one) => one.hash)")
     assert len(links) == 6
     for link in (links[5], links[4], links[1]):
         wanted = re.findall(r"shown=(\[[\d,]*\])", link)[0]

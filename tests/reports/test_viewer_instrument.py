@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 from dataclasses import replace
 from pathlib import Path
 from urllib.parse import quote
@@ -234,6 +235,26 @@ def test_the_command_draws_what_is_shown(chromium: Browser, tmp_path):
     opened(chromium, file, 'run?panels=["plant.sideslip"]')
     command = chromium.run(VIEWER + "viewer.tellCommand(); return viewer.find('command').textContent")
     assert command == "yawbench plot 'results/one run' --panel plant.sideslip --format svg"
+
+
+def test_the_command_of_a_difference_names_its_baseline(chromium: Browser, tmp_path):
+    runs = [LabelledRun(label, replace(whole_car(), folder=Path(f"results/{label}"))) for label in (A, B, C)]
+    (file := tmp_path / "three.html").write_text(page(runs), "utf-8")
+    opened(chromium, file, 'run?panels=["plant.sideslip"]&shown=[2]&baseline=1&difference=true')
+    command = chromium.run(VIEWER + "viewer.tellCommand(); return viewer.find('command').textContent")
+    places = [f"results/{label}" for label in (B, C)]
+    words = [
+        "yawbench",
+        "plot",
+        *places,
+        "--panel",
+        "plant.sideslip",
+        "--minus",
+        places[0],
+        "--format",
+        "svg",
+    ]
+    assert shlex.split(command) == words
 
 
 def test_phase_planes_have_their_limits(chromium: Browser, tmp_path):

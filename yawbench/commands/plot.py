@@ -25,7 +25,7 @@ from yawbench.commands.recorded_runs import (
     with_segments,
 )
 from yawbench.foundation.errors import ScenarioError
-from yawbench.foundation.messages import listed
+from yawbench.foundation.messages import hint, listed
 
 Panels = Annotated[
     list[str] | None,
@@ -35,6 +35,14 @@ Panels = Annotated[
         autocompletion=completing_names("signals"),
         help="A signal (yaw_rate, plant.roll_angle, wheel_torque_*), its error (sideslip_error), one over "
         "another (yaw_rate(sideslip)) or path; repeatable. Default: the figures of the papers.",
+    ),
+]
+Minus = Annotated[
+    str | None,
+    typer.Option(
+        "--minus",
+        metavar="RUN",
+        help="Draw the differences of the other runs from this one, a label or a folder of RESULTS.",
     ),
 ]
 AsPage = Annotated[bool, typer.Option("--page", help="Write view.html, an interactive page, instead.")]
@@ -79,6 +87,22 @@ def _settings(style: str | None, size: str | None) -> Any:
     return settings
 
 
+def _place(run: str, labels: Sequence[str], folders: Sequence[Path]) -> int:
+    """Return the number of a run that is named by its label or its folder, among several.
+
+    Raises:
+        ScenarioError: there is none, or no other run.
+    """
+    names = [*labels, *map(str, folders)]
+    wanted = run if run in labels else str(Path(run))
+    if wanted not in names:
+        near = hint(run, labels, lead="there are")
+        raise ScenarioError(f"--minus {run}: no such run{near}", code="option-invalid")
+    if len(folders) < 2:
+        raise ScenarioError("--minus: needs two runs at least", code="option-invalid")
+    return names.index(wanted) % len(labels)
+
+
 def _check_output(out: Path | None, page: bool, format: str | None, published: bool) -> None:
     """Check that the file, its format and the kind of output agree; `published`: with a style or a size.
 
@@ -110,6 +134,7 @@ def plot(
     options: RunOptions,
     label: Labels = None,
     panel: Panels = None,
+    minus: Minus = None,
     measured: MeasuredRuns = None,
     begin: MeasuredFrom = "0 s",
     page: AsPage = False,
@@ -120,19 +145,26 @@ def plot(
     """Draw one run, or several overlaid.
 
     Figures are written as SVG and PNG; --format, or a file such as --out fig.pdf, chooses one format.
-    With --style or --size, they are made for a publication: no title, no note, fonts embedded. With
-    --page, an interactive page is written instead. A scenario is run first if its results (those of
-    `yawbench run` without --out) are missing or out of date. Without --out, the figure of one run goes
-    into its folder, that of several into their common parent folder.
+    With --minus RUN, the other runs' differences from that run are drawn. With --style or --size, they
+    are made for a publication: no title, no note, fonts embedded. With --page, an interactive page is
+    written instead. A scenario is run first if its results (those of `yawbench run` without --out) are
+    missing or out of date. Without --out, the figure of one run goes into its folder, that of several
+    into their common parent folder.
     """
     import matplotlib
 
     from yawbench.figures.display import LabelledRun
     from yawbench.figures.panels import check_panels
     from yawbench.figures.plots import draw, overview_of, shown_by, size_of_style
+    from yawbench.figures.plots import minus as differences
     from yawbench.figures.style import KINDS, save
     from yawbench.studies.comparison import FIGURES
 
+    if page and minus is not None:
+        raise ScenarioError(
+            "--minus is of figures; on a page, mark the baseline, and 'minus the baseline'",
+            code="option-invalid",
+        )
     settings = _settings(style, size)
     _check_output(options.out, page, format, bool(settings))
     file = options.out if options.out and options.out.suffix[1:] in KINDS and not page else None
@@ -146,8 +178,13 @@ def plot(
         return
     runs = [
         LabelledRun(name, results)
-        for name, results in zip(labels, read_runs(folders, start, thin=True), strict=True)
+        for name, results in zip(labels, read_runs(folders, start, thin=minus is None), strict=True)
     ]
+    if minus is not None:
+        runs = differences(runs, runs[_place(minus, labels, folders)])
+        if "path" in (panel or ()):
+            raise ScenarioError("--minus: the path is no signal; position_y is one", code="option-invalid")
+        panel = panel or [name for name in overview_of(runs) if name != "path"]
     check_panels(runs, panel or ())
     figures: dict[str, Sequence[str]] = {"overview": panel or overview_of(runs)}
     if file:

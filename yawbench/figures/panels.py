@@ -23,6 +23,7 @@ from yawbench.foundation.errors import ScenarioError
 from yawbench.foundation.messages import cut, fold, hint
 from yawbench.metrics.expressions import columns_of, reference_of, while_moving
 from yawbench.metrics.measures import variable_of, words
+from yawbench.orchestrator.results.reader import Results
 from yawbench.vehicles.motion import largest
 from yawbench.vocabulary.wheels import WHEEL_NAMES, wheels
 
@@ -63,13 +64,22 @@ class Panel:
     rows: int = 1
 
 
+class Difference(Results):
+    """The difference of two runs; its angles have their gaps, which its speed could not tell."""
+
+
+def in_motion(run: LabelledRun) -> LabelledRun:
+    """Return a run whose angles of velocities have gaps while the car stands."""
+    return LabelledRun(run.label, while_moving(run.results))
+
+
 @np.errstate(all="ignore")
 def panels_of(runs: Sequence[LabelledRun], name: str, *, whole: bool = False) -> list[Panel]:
     """Return the panels that a name selects: none if no run has the signals, four for wheels.
 
     `whole`: axes include all lines, however far they go.
     """
-    runs = [LabelledRun(run.label, while_moving(run.results)) for run in runs]
+    runs = [run if isinstance(run.results, Difference) else in_motion(run) for run in runs]
     if name == "path":
         drawn = [run for run in runs if _path_columns(run)]
         return [Panel(name, True, lambda axes: draw_path(axes, runs), over_time=False)] if drawn else []
@@ -157,7 +167,8 @@ def _limit(axes: Axes, scale: float, lines: list[tuple[str, float]], unit: str) 
         return
     largest = 1.5 * factor * max(scale, *(peak for _, peak in lines if peak <= OFF_SCALE * scale))
     axes.set_ylim(-largest, largest)
-    note = "; ".join(f"{label}, up to {digits_of(peak * factor)} {text}" for label, peak in lost)
+    room = "\N{NO-BREAK SPACE}"  # a unit stays with its number
+    note = "; ".join(f"{label}, up to {digits_of(peak * factor)}{room}{text}" for label, peak in lost)
     note_above(axes, f"beyond the axes: {note}")
 
 

@@ -12,15 +12,18 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
+
 from yawbench.foundation.errors import ResultsError
 from yawbench.foundation.messages import fold
+from yawbench.metrics.expressions import reference_of
 from yawbench.orchestrator.plan import Override
 from yawbench.orchestrator.recordings.gaps import gaps_noted
 from yawbench.orchestrator.results.run_record import RunStatus
 from yawbench.orchestrator.scenario.overrides import changed, fmu_of
 
 from .display import LabelledRun, digits_of
-from .panels import Panel, panels_of
+from .panels import Difference, Panel, in_motion, panels_of
 from .style import (
     NARROW,
     PANEL_LINES,
@@ -178,6 +181,29 @@ def draw(
         handles = [Line2D([], [], label=label, **style) for label, style in legend]
         frame(figure, ROW * sum(heights), handles, title or title_of(runs), foot, overrides)
     return figure
+
+
+def minus(runs: Sequence[LabelledRun], baseline: LabelledRun) -> list[LabelledRun]:
+    """Return the difference of each other run from a baseline, `B minus A`, as runs without references.
+
+    The baseline is taken at the other run's times, straight between its rows. A difference has the signals
+    that both recorded, and no value where the baseline has ended.
+    """
+    of, found = in_motion(baseline).results, []
+
+    def numeric(values: np.ndarray) -> bool:
+        return bool(np.issubdtype(values.dtype, np.number) or values.dtype == bool)
+
+    for label, results in map(in_motion, (run for run in runs if run is not baseline)):
+        references = {reference_of(results, name) for name in results.columns}
+        columns = {
+            name: values - np.interp(results.time, of.time, of[name], left=np.nan, right=np.nan)
+            for name, values in results.columns.items()
+            if name in of.columns and name not in references and numeric(values) and numeric(of[name])
+        }
+        difference = Difference(results.folder, results.time, columns, results.units, results.record)
+        found.append(LabelledRun(f"{label} minus {baseline.label}", difference))
+    return found
 
 
 def nothing_recorded(run: LabelledRun) -> str:

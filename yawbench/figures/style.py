@@ -251,7 +251,7 @@ def reference_words(lines: Iterable[Line2D]) -> str | None:
     """Return the legend entry of the reference lines among those drawn; None if there are none."""
     pale = [line for line in lines if line.get_label() == "reference"]
     own = any(line.get_color() != REFERENCE["color"] for line in pale)
-    return ("wide and pale: the run's own reference" if own else "reference") if pale else None
+    return ("wide: own reference" if own else "reference") if pale else None
 
 
 def _characters(axes: Axes) -> int:
@@ -328,12 +328,17 @@ def _frame_bare(figure: Figure, size: tuple[float, float], handles: Sequence[Art
         if len(title) > 1:
             axes.set_title("\n".join(title))
     line = rcParams["font.size"] / 72  # inches
-    widths = [CHARACTER * line * len(str(handle.get_label())) + 5 * line for handle in handles]
-    columns = max(1, min(len(handles), int(size[0] / max(widths, default=1.0))))
-    head = 1.5 * line * math.ceil(len(handles) / columns) / size[1]
-    figure.get_layout_engine().set(rect=(0, 0, 1, 1 - head))  # type: ignore[union-attr, call-arg]
-    if handles:
-        figure.legend(
+    most = int((size[0] / line - 4) / CHARACTER)  # characters beside a handle
+    for handle in handles:
+        handle.set_label("\n".join(textwrap.wrap(literal(str(handle.get_label())), most)))
+    for columns in range(len(handles), 0, -1):
+        legend = figure.legend(
             handles=handles, loc="upper left", bbox_to_anchor=(0.0, 1.0), ncols=columns,
-            borderaxespad=0.2, borderpad=0.0, columnspacing=1.0, handlelength=2.6,
+            borderaxespad=0.2, borderpad=0.0, columnspacing=1.0, handlelength=2.2, labelspacing=0.3,
         )  # fmt: skip
+        box = legend.get_window_extent()
+        if columns == 1 or box.width <= 0.98 * figure.bbox.width:
+            head = box.height / figure.bbox.height + 0.6 * line / size[1]
+            figure.get_layout_engine().set(rect=(0, 0, 1, 1 - head))  # type: ignore[union-attr, call-arg]
+            break
+        legend.remove()

@@ -1,4 +1,4 @@
-"""The overview of several experiments: their verdicts, with a link to each page.
+"""The overview of several experiments: papers by verdicts on one screen, below it each claim in words.
 
 A click on a claim loads its runs from a side file.
 """
@@ -13,8 +13,9 @@ from pathlib import Path
 from markupsafe import Markup
 
 from yawbench.foundation.messages import counted
+from yawbench.metrics.verdict import VerdictText
 
-from .page_parts import Page, render
+from .page_parts import SIGNS, Page, render
 from .study_page import VIEW, StudyPage, in_sentence
 from .viewer import (
     DATA,
@@ -34,6 +35,7 @@ class OverviewPage(Page):
 
     template = "overview.html.j2"
     chapters: Sequence[tuple[StudyPage, str]]  # the experiments, each with the address of its page
+    verdicts: Sequence[VerdictText]  # of claims, good ones first: a column of the table each
     answer: str  # how many claims hold, in a sentence
     ranking: str  # address of the ranking's page; "": there is none
     folder: str  # of the side files
@@ -57,6 +59,12 @@ def _answer_of_all(chapters: Sequence[StudyPage]) -> str:
     )
 
 
+def _verdicts_of_all(chapters: Sequence[StudyPage]) -> list[VerdictText]:
+    """Return the verdicts of claims of all studies, each once, in the order of their signs."""
+    found = dict.fromkeys(row.verdict for study in chapters for row in study.claims)
+    return sorted(found, key=lambda words: [*SIGNS].index(words.status))
+
+
 def overview_page(
     chapters: Sequence[StudyPage], pages: Sequence[str], folder: Path, ranking: str = ""
 ) -> str:
@@ -74,7 +82,8 @@ def overview_page(
     tidy_sides(folder, shown.keys())
     view = OverviewPage(
         title=OVERVIEW, chapters=[*zip(chapters, pages, strict=True)], ranking=ranking,
-        answer=_answer_of_all(chapters), folder=DATA, first=next(iter(shown), ""), frame=embedded(None, VIEW),
+        verdicts=_verdicts_of_all(chapters), answer=_answer_of_all(chapters),
+        folder=DATA, first=next(iter(shown), ""), frame=embedded(None, VIEW),
         assets=assets("chooser.js"),
     )  # fmt: skip
     return render(view)

@@ -134,7 +134,8 @@ def _templates(package: str) -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {"verdict": verdict_sign, "minus": with_minus, "compressed": compressed}
+    environment.filters |= {"sign": sign_of, "verdict": verdict_sign}
+    environment.filters |= {"minus": with_minus, "compressed": compressed}
     program = f"yawbench {versions()['yawbench']}"
     environment.globals |= {"static": lambda name: Markup(static(name)), "program": program, "now": now}
     return environment
@@ -176,9 +177,14 @@ def with_minus(text: str) -> str:
     return re.sub(r"(?<![^\s(])-(?=\.?\d)", "−", text)
 
 
+def sign_of(words: VerdictText) -> tuple[str, str]:
+    """Return CSS class and symbol of a verdict in words."""
+    return SIGNS[words.status]
+
+
 def verdict_sign(text: str) -> Markup:
     """Return the text of a verdict with its symbol; other text unchanged."""
     if not isinstance(text, VerdictText):
         return Markup.escape(text)
-    kind, sign = SIGNS[text.status]
+    kind, sign = sign_of(text)
     return Markup('<span class="verdict {}"><b aria-hidden="true">{}</b> {}</span>').format(kind, sign, text)

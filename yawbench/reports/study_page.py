@@ -22,7 +22,7 @@ from yawbench.foundation.errors import ResultsError
 from yawbench.foundation.messages import counted, listed
 from yawbench.measurements.measured_results import filtered_alike
 from yawbench.metrics.expressions import columns_of, evaluate, metric, reference_of
-from yawbench.metrics.verdict import SYMBOLS
+from yawbench.metrics.verdict import SYMBOLS, VerdictText
 from yawbench.orchestrator.plan import Plan
 from yawbench.orchestrator.results.reader import Results
 from yawbench.orchestrator.results.record_of_plan import run_record
@@ -81,7 +81,7 @@ class JudgedClaim:
     note: str
     measured: Sequence[str]  # the values
     conditions: Sequence[str]  # of which all must be met
-    verdict: str
+    verdict: VerdictText
     margin: str | None
     region: Sequence[str]  # how robust the verdict is, a line each
     agreeing: float | None

@@ -22,7 +22,7 @@ class View:
         x: signal on the horizontal axis, or time.
     """
 
-    title: str = ""
+    title: str = "Signals over time"
     panels: Sequence[str] = PANELS
     shown: Sequence[int] | None = None
     x: str = "time"

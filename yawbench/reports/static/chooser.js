@@ -10,9 +10,10 @@ function startChooser() {
   const show = async () => {
     const asked = links().filter((link) => idOf(link.hash) === idOf(location.hash));
     const key = asked.length ? idOf(location.hash) : (shown || root.dataset.first);
-    const current = asked.find((link) => link.hash === location.hash) || asked[0];
-    for (const link of links()) link.removeAttribute('aria-current');
-    (current || links().find((link) => idOf(link.hash) === key))?.setAttribute('aria-current', 'true');
+    const current = asked.find((link) => link.hash === location.hash) || asked[0] || links().find((link) => idOf(link.hash) === key);
+    for (const link of links()) {
+      if (link.hash === current?.hash) link.setAttribute('aria-current', 'true'); else link.removeAttribute('aria-current');
+    }
     const turned = shown !== null;
     if (key && key !== shown) {
       shown = key;
@@ -30,7 +31,7 @@ function startChooser() {
       root.dataset.shown = key;
     }
     const beside = chosen.getBoundingClientRect().left > root.firstElementChild.getBoundingClientRect().left + 10;
-    if (turned && asked.length && !beside) chosen.scrollIntoView();
+    if (turned && asked.length) chosen.scrollIntoView({block: beside ? 'nearest' : 'start'});
   };
   addEventListener('hashchange', show);
   show();

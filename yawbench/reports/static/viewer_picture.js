@@ -166,8 +166,9 @@ function svgOf(viewer, width = PICTURE_WIDE) {
 function commandOf(viewer) {
   const {x} = viewer.state;
   const word = (text) => (/^[\w./,=:~+@%-]+$/.test(text) ? text : `'${text.replaceAll("'", "'\\''")}'`);
-  const folders = viewer.runs.filter((run) => viewer.shows(run)).map((run) => run.folder);
+  const {baseline, state: {difference}} = viewer;
+  const folders = viewer.runs.filter((run) => viewer.shows(run) || (difference && run === baseline)).map((run) => run.folder);
   if (!folders.length || folders.some((one) => !one)) return '';
   const panels = viewer.state.panels.map((spec) => spec.split(',')[0]).map((name) => (viewer.portrait ? `${name}(${x})` : name));
-  return ['yawbench', 'plot', ...folders, ...panels.flatMap((name) => ['--panel', name]), '--format', 'svg'].map(word).join(' ');
+  return ['yawbench', 'plot', ...folders, ...panels.flatMap((name) => ['--panel', name]), ...(difference ? ['--minus', baseline.folder] : []), '--format', 'svg'].map(word).join(' ');
 }
