@@ -451,7 +451,7 @@ class ExperimentSpec(OverrideSpec):
         elif self.points is not None or self.seed is not None:
             raise ValueError(
                 f"points and seed belong to a design that draws: add `design: sobol`, or "
-                f"{listed([one for one in SAMPLES if one != 'sobol'], last='or')}; the design is {self.design}"
+                f"{listed([one for one in SAMPLES if one != 'sobol'], last='or')} (it is {self.design})"
             )
         elif self.probabilities:
             raise ValueError(f"probabilities need a design that draws: {listed(SAMPLES, last='or')}")
