@@ -190,14 +190,14 @@ def _wiring(fmu: Fmu) -> Iterator[Table]:
             ends = _ends(name, variable.causality)
             if ends:
                 equal.setdefault((variable.causality, ends, how), []).append(variable.name)
-        elif (guess := _alike(variable)) or variable.causality == "input":
-            near.setdefault((variable.causality, guess or "-"), []).append(variable.name)
+        elif guess := _alike(variable):
+            near.setdefault((variable.causality, guess), []).append(variable.name)
     rows = [(name, *cells) for cells, names in equal.items() for name in fold(names)]
     yield Table("Wired by equal names", ["name", "causality", "to instances of the roles", "remark"], rows)
     others = [(name, *cells) for cells, names in near.items() for name in fold(names)]
     yield Table(
         "Wired by a connection alone", ["name", "causality", "signals that it resembles"], others,
-        ["Name one under 'connections' of the scenario if it is meant; an input may keep its start value."],
+        ["Name one under 'connections' of the scenario if it is meant."],
     )  # fmt: skip
 
 
