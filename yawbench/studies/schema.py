@@ -503,7 +503,8 @@ class ExperimentSpec(OverrideSpec):
         return max(lengths, default=1) if self.design == "list" else math.prod(lengths)
 
     def _check_sample(self) -> None:
-        if lacking := [name for name in ("points", "seed") if getattr(self, name) is None]:
+        if self.points is None or self.seed is None:
+            lacking = [name for name in ("points", "seed") if getattr(self, name) is None]
             raise ValueError(f"the design {self.design} needs {listed(lacking, last='and')}")
         if not self.drawn:
             raise ValueError(f"a {self.design} needs an axis to draw from: a range, normal or table")
