@@ -106,6 +106,15 @@ def test_a_junit_report_has_every_verdict(folder, fmus, tmp_path):
     assert ElementTree.parse("v.xml").getroot().get("failures") == "0"
 
 
+def test_checks_of_a_study_count_as_its_claims_do(folder, fmus, tmp_path):
+    (tmp_path / "checks.yaml").write_text(STUDY.replace("claims:", "checks:"))
+    study = ("study", "checks.yaml", "--fmus", fmus, "--junit", "checks.xml")
+    assert (status_of(*study), status_of(*study, "--strict")) == (0, 1)
+    root = ElementTree.parse("checks.xml").getroot()
+    assert (root.get("tests"), root.get("failures")) == ("2", "1")
+    assert mentions(root.find(".//failure").get("message"), "does not hold", "N·m")
+
+
 def test_a_run_that_fails_is_an_error_of_the_report_and_what_was_not_judged_is_skipped():
     cases = [
         JudgedCase("A", "run", None, "not completed", "division by zero"),

@@ -317,7 +317,7 @@ SweepFile = Annotated[
 @judging
 @takes(*CHANGES, *MAKING, "jobs", "scheduler", "keep", "format_", "fresh", "no_run", "dry_run")
 def sweep(context: typer.Context, file: SweepFile, options: RunOptions) -> None:
-    """Run a scenario over a grid, list or Latin hypercube.
+    """Run a scenario over a grid, a list, or a sample of distributions.
 
     Writes report.html with tables, limits, curves and maps of the metrics; table.csv and table.parquet,
     one row per run; figures. Without --out, results go to results/<folder of the sweep file>/<its name>.

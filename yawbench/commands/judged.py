@@ -65,7 +65,7 @@ def judged_experiment(findings: ExperimentResult) -> None:
     from yawbench.studies.result_tables import measured_words
 
     title = findings.spec.title
-    for result in findings.claims:
+    for result in findings.judgements:
         why = "; ".join(measured_words(result))
         verdict = replace(result.verdict, status=result.status, why=why)
         judged(title, [(result.claim.says, verdict)], result.group)

@@ -451,7 +451,8 @@ class ExperimentSpec(OverrideSpec):
             self._check_sample()
         elif self.points is not None or self.seed is not None:
             raise ValueError(
-                f"points and seed belong to {listed(SAMPLES, last='or')}; the design is {self.design}"
+                f"points and seed belong to a design that draws: add `design: sobol`, or "
+                f"{listed([one for one in SAMPLES if one != 'sobol'], last='or')} (it is {self.design})"
             )
         elif self.probabilities:
             raise ValueError(f"probabilities need a design that draws: {listed(SAMPLES, last='or')}")
@@ -504,7 +505,8 @@ class ExperimentSpec(OverrideSpec):
 
     def _check_sample(self) -> None:
         if self.points is None or self.seed is None:
-            raise ValueError(f"a {self.design} needs points and seed")
+            lacking = [name for name in ("points", "seed") if getattr(self, name) is None]
+            raise ValueError(f"the design {self.design} needs {listed(lacking, last='and')}")
         if not self.drawn:
             raise ValueError(f"a {self.design} needs an axis to draw from: a range, normal or table")
         if self.design in ("sobol", "saltelli") and self.points & (self.points - 1):
