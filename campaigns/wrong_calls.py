@@ -347,9 +347,10 @@ def _parameters() -> Iterator[Parameter]:
         make, numbers = getattr(yb, name), (*given, "low", "high") if name == "normal" else [*given]
         for one in dict.fromkeys(numbers):
             yield of(f"{name}.{one}", lambda x, n=one, m=make, g=given: m(**{**g, n: x}), one, "low", "high",
-                     name, may={*FINITE, "None", "list", "tuple", "array of 1 dimension",
-                                "pair turned around"})  # fmt: skip
-        yield of(f"{name}.unit", lambda x, m=make, g=given: m(**g, unit=x), "unit", name, may=PRINTABLE | EMPTY)
+                     name, may={*FINITE, *NO_ITEMS, "file", "None", "list", "tuple",
+                                "array of 1 dimension", "pair turned around"})  # fmt: skip
+        yield of(f"{name}.unit", lambda x, m=make, g=given: m(**g, unit=x), "unit", name,
+                 may=PRINTABLE | EMPTY | {"brackets"})  # fmt: skip
         yield of(f"{name}.whole", lambda x, m=make, g=given: m(**g, whole=x), "whole", name, right=TRUTHS)
     yield of("uniform.log", lambda x: yb.uniform(1.0, 2.0, log=x), "log", "uniform", right=TRUTHS)
     yield of("tabulated.shares", lambda x: yb.tabulated([1.0, 2.0], x), "shares", "tabulated",
@@ -365,18 +366,20 @@ def _parameters() -> Iterator[Parameter]:
     bounds = ("below", "at_most", "above", "at_least")
     yield of("Runs.probability.metric", lambda x: b.draws.probability(x, below=1.0), "metric", "metrics")
     for name in bounds:
-        yield of(f"Runs.probability.{name}", lambda x, n=name: b.draws.probability("peak(sideslip)", **{n: x}),
-                 *bounds, "bound", may=FINITE)  # fmt: skip
+        yield of(f"Runs.probability.{name}", lambda x, n=name: b.draws.probability(
+                 "peak(sideslip)", **{n: x}), *bounds, "bound", may=FINITE)  # fmt: skip
     yield of("Runs.to_latex.columns", lambda x: b.draws.to_latex(x), "columns", "column", right=NO_ITEMS,
              may={"file", "frame"})  # fmt: skip
     for name in ("caption", "label"):
         yield of(f"Runs.to_latex.{name}", lambda x, n=name: b.draws.to_latex(**{n: x}), name,
                  may={"None", *TEXTS})  # fmt: skip
     # Steps.
-    yield of("SteppedRun.__getitem__.name", lambda x: b.stepped(lambda run: run[x]), "name", "variable")
-    yield of("SteppedRun.set.name", lambda x: b.stepped(lambda run: run.set(x, 1.0)), "name", "variable")
-    yield of("SteppedRun.set.value", lambda x: b.stepped(lambda run: run.set("plant.mass", x)), "value", "mass",
-             may=FINITE)  # fmt: skip
+    yield of("SteppedRun.__getitem__.name", lambda x: b.stepped(lambda run: run[x]), "name", "variable",
+             "column")  # fmt: skip
+    yield of("SteppedRun.set.name", lambda x: b.stepped(lambda run: run.set(x, 1.0)), "name", "variable",
+             "set must be")  # fmt: skip
+    yield of("SteppedRun.set.value", lambda x: b.stepped(lambda run: run.set("plant.mass", x)), "value",
+             "mass", may=FINITE)  # fmt: skip
     yield of("SteppedRun.step.steps", lambda x: b.stepped(lambda run: run.step(x)), "steps",
              may={"three", "numpy uint8", "10**18", "zero"})  # fmt: skip
     yield of("SteppedRun.run_to.time", lambda x: b.stepped(lambda run: run.run_to(x)), "time", may=FINITE)

@@ -28,7 +28,9 @@ def _number(value: Any, name: str) -> float:
 
 def _drawn(unit: str, whole: bool, **keys: Any) -> Drawn:
     given = {name: value for name, value in keys.items() if value is not None}
-    more = {"unit": arguments.text(unit, "unit")} if unit else {}
+    with arguments.as_scenario_errors():
+        named = arguments.text(unit, "unit", empty=True)
+    more = {"unit": named} if named else {}
     return Drawn(given | more | ({"whole": True} if arguments.flag(whole, "whole") else {}))
 
 
@@ -69,8 +71,8 @@ def normal(
         low, high: ends.
         unit, whole: as for `uniform`.
     """
-    ends = {"from": low, "to": high}
-    given = {name: None if end is None else _number(end, name) for name, end in ends.items()}
+    ends = {"from": (low, "low"), "to": (high, "high")}
+    given = {key: None if end is None else _number(end, name) for key, (end, name) in ends.items()}
     numbers = {"mean": _number(mean, "mean"), "deviation": _number(deviation, "deviation")}
     return _drawn(unit, whole, normal=numbers, **given)
 

@@ -179,6 +179,7 @@ def as_scenario_errors(origin: str = "") -> Iterator[None]:
 def plain(value: Any) -> Any:
     """Return a NumPy scalar or a 0-d array as plain Python, anything else unchanged."""
     is_single = isinstance(value, (np.generic, np.ndarray)) and value.shape == ()
+    is_single = is_single and value is not np.ma.masked
     return value.item() if is_single and value.dtype.kind in "biufU" else value  # no dates
 
 

@@ -140,14 +140,14 @@ class SteppedRun:
         Raises:
             ScenarioError: the time has passed, or lies after the end.
         """
-        point = int((time - self.plan.time(0)) / float(self.plan.step) + LATE)
-        if not self.completed <= point <= self.plan.n_steps:
+        points = (time - self.plan.time(0)) / float(self.plan.step) + LATE
+        if not self.completed <= points < self.plan.n_steps + 1:
             raise ScenarioError(
-                f"the run is at t = {self.time:.9g} s and ends at {self.plan.time(self.plan.n_steps):.9g} s; "
-                f"it cannot go to {time:.9g} s",
+                f"time: the run is at t = {self.time:.9g} s and ends at "
+                f"{self.plan.time(self.plan.n_steps):.9g} s; it cannot go to {time:.9g} s",
                 code="argument-invalid",
             )
-        return point
+        return int(points)
 
     def advance(self, point: int, when: Callable[[], bool] | None = None) -> bool:
         """Step to a communication point, or until an instance ends the run.
@@ -239,8 +239,8 @@ class SteppedRun:
             found = [(slots[instance.name], variable) for instance, variable in reached(self.plan, target)]
         if not found:
             raise ScenarioError(
-                f"{target}: is nothing that can change in a run; give instance.variable, inputs.pattern or "
-                "a fact such as friction",
+                f"{short(str(target))}: is nothing that can change in a run; give instance.variable, "
+                "inputs.pattern or a fact such as friction",
                 code="variable-unknown",
             )
         wanted = []

@@ -230,7 +230,7 @@ class Results:
         short = {name.variable: column for column, name in self.names.items()}
         close = get_close_matches(variable, [*self.columns, *short], n=1)
         hint = f"; did you mean '{close[0]}'?" if close else f"; recorded: {', '.join(fold([*self]))}."
-        return f"{self.where}: no column '{variable}'{of} was recorded{hint}"
+        return f"{self.where}: no column {short(variable)}{of} was recorded{hint}"
 
 
 def _is_the_same(wire: ConnectionRecord, unit: str | None) -> bool:

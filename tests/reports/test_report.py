@@ -382,6 +382,7 @@ def test_the_four_papers_are_found_in_their_order_and_what_goes_beyond_them_afte
         "gain_scheduled/study.yaml",
         "envelope_mpc/study.yaml",
         "phase_plane/study.yaml",
+        "proving_ground/esc.yaml",
     ]
 
 
