@@ -227,8 +227,8 @@ class Results:
 
     def _unknown(self, variable: str, role: str | None = None) -> str:
         of = f" of a {role}" if role else ""
-        short = {name.variable: column for column, name in self.names.items()}
-        close = get_close_matches(variable, [*self.columns, *short], n=1)
+        variables = {name.variable for name in self.names.values()}
+        close = get_close_matches(variable, [*self.columns, *variables], n=1)
         hint = f"; did you mean '{close[0]}'?" if close else f"; recorded: {', '.join(fold([*self]))}."
         return f"{self.where}: no column {short(variable)}{of} was recorded{hint}"
 
