@@ -41,17 +41,15 @@ def rendered(pattern: str, names: Mapping[str, Any]) -> dict[Path, str]:
 
 def reflowed(text: str) -> str:
     """Return Markdown with paragraphs and items of lists in even lines; tables and code as they are."""
-    blocks, made = re.split(r"\n\n+", text), list[str]()
-    fenced = False
-    for block in blocks:
+    made, fenced = "", False
+    for block, gap in re.findall(r"(.+?)(\n\n+|\n*\Z)", text, re.DOTALL):
         inside = fenced
         fenced ^= bool(block.count("```") % 2)
-        if inside or "```" in block or block.startswith(("|", "#", "    ", "<", "![", ">")):
-            made.append(block)
-        else:
+        if not (inside or "```" in block or block.startswith(("|", "#", "    ", "<", "![", ">"))):
             items = re.split(r"\n(?=- )", block)
-            made.append("\n".join(_wrapped(item) for item in items))
-    return "\n\n".join(made).rstrip() + "\n"
+            block = "\n".join(_wrapped(item) for item in items)
+        made += block + (gap if fenced else "\n\n")
+    return made.rstrip() + "\n"
 
 
 def _wrapped(text: str) -> str:

@@ -216,6 +216,16 @@ class Results:
         ]
         return [column for column in dict.fromkeys(feeding) if column in self.columns]
 
+    def inputs_fed(self, column: str) -> list[str]:
+        """Return the names of the inputs that a column feeds unchanged, by which it is known, too."""
+        name, unit = self.names[column], self.units.get(column)
+        fed = [
+            wire.target.variable
+            for wire in self.record.connections
+            if wire.source == name and wire.target.variable != name.variable and _is_the_same(wire, unit)
+        ]
+        return [*dict.fromkeys(fed)]
+
     @cached_property
     def _roles(self) -> dict[str, str]:
         """Instance -> its role."""

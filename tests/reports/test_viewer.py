@@ -23,7 +23,7 @@ from yawbench.figures.panels import LabelledRun
 from yawbench.foundation.errors import ResultsError
 from yawbench.measurements.measured_results import MeasuredResults
 from yawbench.orchestrator.results.reader import Results
-from yawbench.orchestrator.results.run_record import RunRecord
+from yawbench.orchestrator.results.run_record import ConnectionRecord, RunRecord
 from yawbench.reports.page_parts import without_comments
 from yawbench.reports.viewer import MOST, Settings, answer_of, page, still_of, viewer
 from yawbench.reports.viewer_data import pack
@@ -560,6 +560,15 @@ def test_adding_removing_and_unknown_signals(chromium, two):
     assert chromium.run(add, "plant.nothing") == [len(PANELS) + 2, False]
     chromium.run("document.querySelector('.yv-panel [title=Remove]').click()")
     assert chromium.run("return document.querySelectorAll('.yv-panel').length") == len(PANELS) + 1
+
+
+def test_a_signal_is_found_by_the_input_that_it_feeds(chromium, tmp_path):
+    run = whole_car()
+    wire = ConnectionRecord.model_validate({"from": "plant.velocity_x", "to": "sensor.speed_true"})
+    wired = replace(run, record=run.record.model_copy(update={"connections": [wire]}))
+    (tmp_path / "view.html").write_text(page([LabelledRun("wired", wired)]), "utf-8")
+    opened(chromium, tmp_path / "view.html")
+    assert chromium.run(VIEWER + "return viewer.named('speed_true')") == "plant.velocity_x"
 
 
 def test_hiding_a_run_takes_its_lines_and_its_car(chromium, two):

@@ -396,7 +396,7 @@ def _needed(views: Sequence[Mapping[str, Any]], roads: Sequence[Mapping[str, Any
 
 
 def _signals(results: Sequence[Results]) -> dict[str, dict[str, Any]]:
-    """Return label, displayed unit, factor to it and unit of every numeric column."""
+    """Return label, displayed unit, factor to it, unit and inputs fed of every numeric column."""
     signals = {}
     for run in results:
         for name, values in run.columns.items():
@@ -405,6 +405,8 @@ def _signals(results: Sequence[Results]) -> dict[str, dict[str, Any]]:
                 text, factor = shown_unit(unit)
                 label = words(run.names[name].variable)
                 signals[name] = {"label": label, "unit": text, "factor": factor, "si": unit}
+                if fed := run.inputs_fed(name):
+                    signals[name]["fed"] = fed
     return signals
 
 

@@ -376,8 +376,8 @@ class Viewer extends InAddress {
     if (text in signals) return text;
     const wanted = text.toLowerCase();
     const words = (name) => {
-      const {label, unit} = signals[name];
-      return [name, name.slice(name.indexOf('.') + 1), label, unit ? `${label} in ${unit}` : label].map((one) => one.toLowerCase());
+      const {label, unit, fed = []} = signals[name];
+      return [name, name.slice(name.indexOf('.') + 1), ...fed, label, unit ? `${label} in ${unit}` : label].map((one) => one.toLowerCase());
     };
     const every = Object.keys(signals);
     const whole = every.filter((name) => words(name).includes(wanted));
