@@ -31,7 +31,7 @@ from yawbench.studies.result_figures import draw_over_axes
 from yawbench.studies.result_files import columns_of
 from yawbench.studies.schema import FigureSpec
 from yawbench.studies.tables import Table, to_latex, to_pandas
-from yawbench.studies.uncertainty import sample_columns
+from yawbench.studies.uncertainty import groups_of, sample_columns
 
 from . import arguments
 from ._controller import PythonComponent
@@ -336,10 +336,10 @@ class Runs:
         )
 
     def _of_sample(self, name: str) -> pd.DataFrame:
-        tables = sample_columns(self._findings)
-        if not tables:
+        if not groups_of(self._findings):
             raise ResultsError("nothing was drawn: give an axis a distribution", code="results-missing")
-        if name not in tables:
+        tables = sample_columns(self._findings, [name])
+        if not tables:
             raise ResultsError(
                 f"there are no {name}: no listed axis has two levels, or no run has a number",
                 code="results-missing",

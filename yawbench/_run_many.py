@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from yawbench.foundation.errors import YawbenchError
+from yawbench.foundation.errors import SimulationError, YawbenchError
 from yawbench.orchestrator.master.fmi import open_instance
 from yawbench.orchestrator.master.log import Log
 from yawbench.orchestrator.plan import Instance
@@ -28,6 +28,23 @@ def opener_of(programs: Mapping[Path, PythonComponent]) -> Callable[[Instance, L
         )
 
     return opener
+
+
+class Opened:
+    """An opener that keeps the instances it has opened, for the exception of the one that failed."""
+
+    def __init__(self, make: Callable[..., Any]) -> None:
+        self._make = make
+        self.instances: list[Any] = []
+
+    def __call__(self, instance: Instance, log: Log, corrupted: set[Path]) -> Any:
+        self.instances.append(self._make(instance, log, corrupted))
+        return self.instances[-1]
+
+    def cause(self, error: SimulationError) -> BaseException | None:
+        """Return the exception of Python code in the instance that an error names; None if it is no code."""
+        failed = (one for one in self.instances if one.name == error.instance)
+        return next((getattr(one, "error", None) for one in failed), None)
 
 
 def planner_of(programs: Mapping[Path, PythonComponent]) -> Planner:

@@ -24,9 +24,8 @@ from yawbench.foundation.errors import (
 )
 from yawbench.foundation.messages import hint, short
 from yawbench.orchestrator.fault_kinds import FaultList, FaultName
-from yawbench.orchestrator.master.log import Log
 from yawbench.orchestrator.master.simulate import simulate_in_memory
-from yawbench.orchestrator.plan import Instance, Override, Plan
+from yawbench.orchestrator.plan import Override, Plan
 from yawbench.orchestrator.scenario import catalogue
 from yawbench.orchestrator.scenario.overrides import faults_at, setting, with_changes
 from yawbench.orchestrator.scenario.schema import LoadedScenario
@@ -40,7 +39,7 @@ from ._controller import ControllerLike, PythonComponent
 from ._known_fmus import KnownFmus
 from ._progress import bar
 from ._run import Run
-from ._run_many import opener_of, planner_of
+from ._run_many import Opened, opener_of, planner_of
 from .planner import Planner
 
 if TYPE_CHECKING:
@@ -289,13 +288,7 @@ class Scenario:
         wanted, called = arguments.plain(progress), None
         if wanted is not None and type(wanted) is not bool:
             wanted, called = False, arguments.function(progress, "progress", "done", "total")
-        opened: list[Any] = []
-        make = opener_of(self._programs)
-
-        def opener(instance: Instance, log: Log, corrupted: set[Path]) -> Any:
-            opened.append(make(instance, log, corrupted))
-            return opened[-1]
-
+        opener = Opened(opener_of(self._programs))
         with bar(self.title, wanted=wanted) as shown:
             plan, report = self.plan(), called or shown.update
             try:
@@ -305,13 +298,12 @@ class Scenario:
                 except SimulationError as error:
                     if (again := self._in_python(plan, str(error))) == plan:
                         raise
-                    opened.clear()
+                    opener.instances.clear()
                     # It ends, or fails again, with the exception.
                     run = Run(simulate_in_memory(again, opener=opener, watch=WarningWatch(again)))
             except SimulationError as error:
                 warn(with_changes(plan.title, plan.changes), (*plan.diagnostics, *error.warnings))
-                ended = [instance for instance in opened if instance.name == error.instance]
-                raise error from next((getattr(instance, "error", None) for instance in ended), None)
+                raise error from opener.cause(error)
         warn(run._full_title, run.diagnostics)
         return run
 

@@ -17,6 +17,7 @@ from yawbench.orchestrator.signal_names import SignalName, Target
 
 from . import arguments
 from ._run import Run
+from ._run_many import Opened
 
 T = TypeVar("T")
 
@@ -38,13 +39,8 @@ class SteppedRun:
     """
 
     def __init__(self, plan: Plan, opener: Callable[..., Any]) -> None:
-        self._opened: list[Any] = []
-
-        def noted(*of: Any) -> Any:
-            self._opened.append(opener(*of))
-            return self._opened[-1]
-
-        self._run = self._of_program(lambda: Stepped(plan, opener=noted, watch=WarningWatch(plan)))
+        self._opened = Opened(opener)
+        self._run = self._of_program(lambda: Stepped(plan, opener=self._opened, watch=WarningWatch(plan)))
         self._columns = results_to_be(plan)
 
     def __enter__(self) -> SteppedRun:
@@ -103,7 +99,7 @@ class SteppedRun:
         """
         condition = arguments.function(condition, "condition")
         last = self._run.plan.n_steps if time is None else self._run.point_at(arguments.number(time, "time"))
-        return self._of_program(lambda: self._run.advance(last, lambda: bool(condition())))
+        return self._of_program(lambda: self._run.advance(last, condition))
 
     def __getitem__(self, name: str) -> Value:
         """Return the value now of a variable, by `instance.variable` or by the unique name of a column."""
@@ -160,8 +156,7 @@ class SteppedRun:
         try:
             return act()
         except SimulationError as error:
-            ended = [instance for instance in self._opened if instance.name == error.instance]
-            raise error from next((getattr(instance, "error", None) for instance in ended), None)
+            raise error from self._opened.cause(error)
 
     def __repr__(self) -> str:
         plan = self._run.plan

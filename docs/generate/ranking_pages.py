@@ -11,7 +11,7 @@ import math
 import re
 from collections.abc import Iterable
 from dataclasses import replace
-from functools import cached_property
+from functools import cache, cached_property, partial
 from pathlib import Path
 from statistics import fmean, geometric_mean, median
 
@@ -25,7 +25,6 @@ from yawbench.ranking.ranking_scores import IDLE, EntryScore
 from yawbench.ranking.settings import settings_sentence
 from yawbench.ranking.threat_runs import Survived, ThreatResult, published_result
 from yawbench.ranking.threat_scores import (
-    ComparedSetting,
     Moves,
     ScoreTable,
     compared_setting,
@@ -108,6 +107,7 @@ class Threats:
         self.scores: ScoreTable = scored(result)
         self.entries = self.scores.order()
         self.tables = threat_tables.tables_text(result)
+        self.setting = cache(partial(compared_setting, result))
 
     def title(self, entry: str) -> str:
         """Return an entry's title inside a sentence."""
@@ -193,10 +193,6 @@ class Threats:
         main = self.threats.main
         cars = self.threats.cars_facing(main, threat)
         return [self.result.survived[SearchPlace(main, threat, car, entry)] for car in cars]
-
-    def setting(self, name: str) -> ComparedSetting:
-        """Return a setting beside the main one."""
-        return compared_setting(self.result, name)
 
     def moves(self, name: str) -> Moves:
         """Return how the order moves from main to a setting."""

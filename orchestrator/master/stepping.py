@@ -9,7 +9,6 @@ import contextlib
 import copy
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from types import TracebackType
 from typing import Any
 
 from yawbench.fmus.fmu import Value, Variable
@@ -51,7 +50,7 @@ class SavedState:
 
 
 class SteppedRun:
-    """A run that has been initialized and waits to be stepped; a context manager that frees its instances.
+    """A run that has been initialized and waits to be stepped; `close` frees its instances.
 
     Args:
         plan: of the run.
@@ -75,14 +74,6 @@ class SteppedRun:
         self._failed: SimulationError | None = None
         with self._acting():
             self._course.begin(opener)
-
-    def __enter__(self) -> SteppedRun:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def close(self) -> None:
         """Free the instances; what was recorded stays."""

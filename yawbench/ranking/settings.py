@@ -113,8 +113,7 @@ def settings_sentence(settings: Sequence[SettingScores]) -> str:
     if len(settings) < 2:
         return ""
     order = order_kept(settings)
-    clear = {pair for one in settings for pair in _clear(one)}
-    always = {pair for pair in clear if all(pair in _clear(one) for one in settings)}
+    always = set.intersection(*map(_clear, settings))
     totals = {one.title: _passes(one) for one in settings}
     most, least = max(totals, key=lambda t: totals[t]), min(totals, key=lambda t: totals[t])
     firsts: dict[str, int] = {}

@@ -220,6 +220,12 @@ class ValueDrawing(Drawing):
             if math.isnan(y):
                 axes.plot([x], [0.0], transform=axes.get_xaxis_transform(), clip_on=False, **FAILED)
 
+    def show_metric(self) -> None:
+        """Show the figure's metric: its title and its unit."""
+        chosen = self.findings.spec.metrics[self.spec.metric]
+        self.what = chosen.heading or metric(chosen.metric).title
+        self.show_in(self.findings.unit(self.spec.metric))
+
     def draw_mark(self, axes: Axes) -> None:
         """Draw the marked value, if there is one."""
         if self.mark is not None:
@@ -231,9 +237,7 @@ class MetricDrawing(ValueDrawing):
 
     def __init__(self, findings: ExperimentResult, spec: FigureSpec) -> None:
         super().__init__(findings, spec)
-        chosen = findings.spec.metrics[spec.metric]
-        self.what = chosen.heading or metric(chosen.metric).title
-        self.show_in(findings.unit(spec.metric))
+        self.show_metric()
         self.upwards = self.label(spec.y) if spec.y else self.measured
         numbers = [self.shown(self.value(run))[0] for run in self.runs]
         drawn = [x for x in numbers if not math.isnan(x) and (x > 0 or spec.scale != "log")]

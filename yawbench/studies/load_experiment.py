@@ -50,8 +50,9 @@ LONGEST = 100
 _FOLDER = re.compile(rf"[\w.+-]{{1,{LONGEST}}}")
 Texts = TypeVar("Texts", Claim, DerivedSpec)
 SCENARIOS = Path("scenarios")
-SCENARIO = "a scenario"
 """Folder searched for studies if none is given."""
+SCENARIO = "a scenario"
+"""What a name is of, as `catalogue` says it."""
 
 
 def found_studies(folder: Path = SCENARIOS) -> list[Path]:

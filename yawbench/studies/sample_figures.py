@@ -10,10 +10,9 @@ import numpy as np
 
 from yawbench.figures.style import literal
 from yawbench.foundation.errors import ResultsError
-from yawbench.metrics.expressions import metric
 
 from .axes import RUN, Level, names_of
-from .axis_figures import GUIDE, Drawing, ValueDrawing
+from .axis_figures import GUIDE, ValueDrawing
 from .experiment import Case
 from .experiment_result import ExperimentResult
 from .schema import FigureSpec
@@ -31,10 +30,8 @@ class SampleDrawing(ValueDrawing):
     """Base of drawings of groups of a sample."""
 
     def __init__(self, findings: ExperimentResult, spec: FigureSpec) -> None:
-        Drawing.__init__(self, findings, spec)
-        chosen = findings.spec.metrics[spec.metric]
-        self.what = chosen.heading or metric(chosen.metric).title
-        self.show_in(findings.unit(spec.metric))
+        super().__init__(findings, spec)
+        self.show_metric()
         self.groups = groups_of(findings)
 
     def grouped(self, runs: Sequence[Case]) -> Iterator[tuple[Group, Level | None, dict[str, Any]]]:

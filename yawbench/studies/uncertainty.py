@@ -99,7 +99,7 @@ def groups_of(findings: ExperimentResult) -> list[Group]:
     number = runs_of_design(spec.design, len(spec.drawn), spec.points or 0)
     groups = []
     for first in range(0, len(experiment.cases), number):
-        cases = experiment.cases[first : first + number]
+        cases = [*experiment.cases[first : first + number]]  # each made once: a point asks every distribution
         pairs = zip(spec.axes, cases[0].point, strict=True)
         levels = tuple((name, level) for name, level in pairs if name not in spec.drawn)
         groups.append(Group(cases[0].run, levels, cases))
@@ -228,17 +228,21 @@ def sample_tables(findings: ExperimentResult) -> list[Table]:
     return [table for table in tables if table.rows]
 
 
-def sample_columns(findings: ExperimentResult) -> dict[str, Table]:
-    """Return name -> columns of a sample for programs and files, in SI units."""
+def sample_columns(findings: ExperimentResult, names: Iterable[str] = ()) -> dict[str, Table]:
+    """Return name -> columns of a sample for programs and files, in SI units.
+
+    Args:
+        findings: of the experiment.
+        names: of the tables; default: all. Tables without rows are left out.
+    """
     groups = groups_of(findings)
     if not groups:
         return {}
-    tables = {
-        "statistics": _statistics(findings, groups),
-        "probabilities": _probabilities(findings, groups),
-        "differences": _difference_columns(findings, differences_of(findings, groups)),
-        "sensitivity": _sensitivities(findings, groups),
-    }
+    make = {
+        "statistics": _statistics, "probabilities": _probabilities, "differences": _difference_columns,
+        "sensitivity": _sensitivities,
+    }  # fmt: skip
+    tables = {name: make[name](findings, groups) for name in names or make}
     return {name: table for name, table in tables.items() if table.rows}
 
 
@@ -354,39 +358,38 @@ def holding(findings: ExperimentResult, group: Group, assertion: Assertion) -> t
 
 
 def _probability_rows(
-    findings: ExperimentResult, groups: Sequence[Group]
-) -> list[tuple[Group, str, int, int, Estimate]]:
+    findings: ExperimentResult, groups: Sequence[Group], names: Iterable[str]
+) -> list[tuple[Group, str, int, int, int, Estimate]]:
+    """Return group, name, how many runs meet it, have no number, and there are, and the probability."""
     rows = []
-    for name, assertion in findings.spec.probabilities.items():
+    for name in names:
         for group in groups:
-            count, missing, number = holding(findings, group, assertion)
-            rows.append((group, name, count, missing, probability(count, number)))
+            count, missing, number = holding(findings, group, findings.spec.probabilities[name])
+            rows.append((group, name, count, missing, number, probability(count, number)))
     return rows
 
 
 def _shown_probability(findings: ExperimentResult, groups: Sequence[Group], name: str) -> Table:
     says = findings.spec.probabilities[name].says.rstrip(".")
     table = Table(f"Probability: {says}", [*_names(findings), "runs", "probability"])
-    for group, of, count, missing, estimate in _probability_rows(findings, groups):
-        if of == name:
-            number = len(independent(findings, group.cases))
-            table.rows.append([*group.words, f"{count} of {number}", _with_bounds(estimate, "%")])
-            if missing:
-                table.notes = ["a run without a number counts as one that does not meet the conditions"]
+    for group, _, count, missing, number, estimate in _probability_rows(findings, groups, [name]):
+        table.rows.append([*group.words, f"{count} of {number}", _with_bounds(estimate, "%")])
+        if missing:
+            table.notes = ["a run without a number counts as one that does not meet the conditions"]
     return table
 
 
 def _probabilities(findings: ExperimentResult, groups: Sequence[Group]) -> Table:
-    rows = _probability_rows(findings, groups)
+    rows = _probability_rows(findings, groups, findings.spec.probabilities)
     names = _names(findings)
     words = [group.words for group, *_ in rows]
     return Table.of_columns(
         [
             column("probability of", "string", [name for _, name, *_ in rows]),
             *(column(name, "string", [row[k] for row in words]) for k, name in enumerate(names)),
-            column("runs", "int64", [len(independent(findings, group.cases)) for group, *_ in rows]),
-            column("meeting", "int64", [count for *_, count, _, _ in rows]),
-            column("missing", "int64", [missing for *_, missing, _ in rows]),
+            column("runs", "int64", [number for *_, number, _ in rows]),
+            column("meeting", "int64", [count for *_, count, _, _, _ in rows]),
+            column("missing", "int64", [missing for *_, missing, _, _ in rows]),
             *_estimated("probability", [estimate for *_, estimate in rows], {"unit": "1"}),
         ]
     )
@@ -404,7 +407,6 @@ class Difference(NamedTuple):
 
 def differences_of(findings: ExperimentResult, groups: Sequence[Group]) -> list[Difference]:
     """Return each group with that of the first value of each listed axis, all others alike."""
-    by_levels = {(group.run.name, group.levels): group for group in groups}
     found = []
     for name in _names(findings):
         firsts: dict[Any, Group] = {}
@@ -418,7 +420,7 @@ def differences_of(findings: ExperimentResult, groups: Sequence[Group]) -> list[
             first = firsts.setdefault(others, group)
             if first is not group:
                 than = first.run.row if name == RUN else dict(first.levels)[name].words
-                found.append(Difference(name, by_levels[group.run.name, group.levels], first, here, than))
+                found.append(Difference(name, group, first, here, than))
     return found
 
 
@@ -443,17 +445,14 @@ def _shown_differences(findings: ExperimentResult, differences: Sequence[Differe
     return table
 
 
-def _difference_columns(findings: ExperimentResult, differences: Sequence[Difference]) -> Table:
-    rows = [(of, key) for of in differences for key in findings.spec.metrics]
+def _difference_columns(findings: ExperimentResult, groups: Sequence[Group]) -> Table:
+    rows = [(of, key) for of in differences_of(findings, groups) for key in findings.spec.metrics]
     numbers = [subtracted(findings, of.group, of.baseline, key) for of, key in rows]
-    some = [len(of) > 0 for of in numbers]
     smaller = [probability(int(np.sum(of < 0)), len(of)) if len(of) else None for of in numbers]
     percentiles = [
         part
         for p in SHOWN
-        for part in _estimated(
-            f"p{p}", [percentile(of, p) if is_ else None for of, is_ in zip(numbers, some, strict=True)]
-        )
+        for part in _estimated(f"p{p}", [percentile(of, p) if len(of) else None for of in numbers])
     ]
     return _columns(
         findings,
@@ -478,9 +477,9 @@ def sensitivities(
     points, places = spec.points or 0, {name: k for k, name in enumerate(spec.axes)}
     own = independent(findings, numbers)
     known = np.isfinite(own)
-    found = {}
+    found, cases = {}, independent(findings, group.cases)
     for k, name in enumerate(spec.drawn):
-        levels = [float(case.point[places[name]].value) for case in independent(findings, group.cases)]
+        levels = [float(case.point[places[name]].value) for case in cases]
         indices = None
         if spec.design == "saltelli":
             a, b, *mixed = (numbers[i * points : (i + 1) * points] for i in range(len(spec.drawn) + 2))
