@@ -117,9 +117,7 @@ def _nothing() -> None:
 
 def _print_version(requested: bool) -> None:
     if requested:
-        from importlib.metadata import version
-
-        typer.echo(f"yawbench {version('yawbench')}")
+        typer.echo(overview.answer(["--version"]))
         raise typer.Exit
 
 

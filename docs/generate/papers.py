@@ -31,9 +31,8 @@ from yawbench.studies.result_tables import NO_FLIP, flip_words, share, share_wor
 from yawbench.vocabulary.gravity import G
 
 from .published import replaced
-from .templates import reflowed, rendered, row, rule
+from .templates import DOCS, reflowed, rendered, row, rule
 
-DOCS = Path(__file__).resolve().parents[1]
 SCENARIOS = DOCS.parent / "scenarios"
 FILE = DOCS / "papers.json"
 STUDIES = {

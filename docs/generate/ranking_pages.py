@@ -21,7 +21,7 @@ from yawbench.ranking.disciplines import disciplines
 from yawbench.ranking.gains_and_laws import ComparedGains, compared_gains
 from yawbench.ranking.nuisance import nuisance_sentence
 from yawbench.ranking.ranking import load_ranking
-from yawbench.ranking.ranking_scores import IDLE, EntryScore
+from yawbench.ranking.ranking_scores import IDLE, EntryScore, RankedState
 from yawbench.ranking.settings import settings_sentence
 from yawbench.ranking.threat_runs import Survived, ThreatResult, published_result
 from yawbench.ranking.threat_scores import (
@@ -72,11 +72,11 @@ class Matrix:
 
     def number(self, least: int) -> int:
         """Return how many laws pass at least so many conditions."""
-        return sum(sum(cell.passed for cell in score.cells.values()) >= least for score in self.laws)
+        return sum(score.count(RankedState.PASSED) >= least for score in self.laws)
 
     def passing_fewer(self, than: int) -> str:
         """Return the titles of the laws that pass fewer conditions."""
-        return names(score for score in self.laws if sum(cell.passed for cell in score.cells.values()) < than)
+        return names(score for score in self.laws if score.count(RankedState.PASSED) < than)
 
     def braking(self, most: float) -> str:
         """Return the titles of the laws that brake for at most a share of ordinary driving."""

@@ -8,7 +8,6 @@ skipped, with its reason; a run that was not completed is an error.
 from __future__ import annotations
 
 import functools
-import inspect
 from collections.abc import Callable, Iterable
 from contextvars import ContextVar
 from dataclasses import dataclass, replace
@@ -19,6 +18,8 @@ from xml.etree import ElementTree
 import typer
 
 from yawbench.foundation.messages import printable
+
+from .output import with_options
 
 if TYPE_CHECKING:
     from yawbench.metrics.verdict import Judged, Status, Verdict
@@ -100,7 +101,6 @@ def _reason(verdict: Verdict) -> str:
 
 def judging(command: Callable[..., None]) -> Callable[..., None]:
     """Mark a command that judges, and so takes `--strict` and `--junit`."""
-    own = inspect.signature(command, eval_str=True)
 
     @functools.wraps(command)
     def called(*, strict: bool, junit: Path | None, **arguments: Any) -> None:
@@ -122,13 +122,7 @@ def judging(command: Callable[..., None]) -> Callable[..., None]:
         if strict and any(_failed(case) for case in cases):
             raise typer.Exit(1)
 
-    options = [
-        inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=kind)
-        for name, default, kind in (("strict", False, Strict), ("junit", None, Junit))
-    ]
-    every = [parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY) for parameter in own.parameters.values()]
-    called.__signature__ = inspect.Signature([*every, *options])  # type: ignore[attr-defined]
-    return called
+    return with_options(command, called, strict=(False, Strict), junit=(None, Junit))
 
 
 def _failed(case: JudgedCase) -> bool:
@@ -145,29 +139,20 @@ def to_junit(cases: Iterable[JudgedCase]) -> str:
     """
     from yawbench.metrics.verdict import Status
 
+    tags = {Status.PASSED: "", Status.FAILED: "failure", None: "error"}
+    counted = {"tests": "testcase", "failures": "failure", "errors": "error", "skipped": "skipped"}
     root = ElementTree.Element("testsuites", name="yawbench")
     suites: dict[str, ElementTree.Element] = {}
-    counts: dict[str, dict[str, int]] = {}
     for case in cases:
         title = printable(case.suite)
         if title not in suites:
             suites[title] = ElementTree.SubElement(root, "testsuite", name=title)
-            counts[title] = dict.fromkeys(("tests", "failures", "errors", "skipped"), 0)
         entry = ElementTree.SubElement(suites[title], "testcase", classname=title, name=printable(case.name))
-        counts[title]["tests"] += 1
-        told = {"message": printable(f"{case.words}: {case.why}" if case.why else case.words)}
-        if case.status is None:
-            ElementTree.SubElement(entry, "error", told)
-            counts[title]["errors"] += 1
-        elif case.status is Status.FAILED:
-            ElementTree.SubElement(entry, "failure", told)
-            counts[title]["failures"] += 1
-        elif case.status is not Status.PASSED:
-            ElementTree.SubElement(entry, "skipped", told)
-            counts[title]["skipped"] += 1
-    for title, suite in suites.items():
-        for name, number in counts[title].items():
-            suite.set(name, str(number))
-            root.set(name, str(int(root.get(name, "0")) + number))
+        if tag := tags.get(case.status, "skipped"):
+            told = printable(f"{case.words}: {case.why}" if case.why else case.words)
+            ElementTree.SubElement(entry, tag, message=told)
+    for element in (*suites.values(), *([root] if suites else ())):
+        for name, tag in counted.items():
+            element.set(name, str(sum(1 for _ in element.iter(tag))))
     ElementTree.indent(root)
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"

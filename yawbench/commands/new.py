@@ -192,8 +192,13 @@ def _rendered(templates: dict[PurePosixPath, str], facts: dict[str, Any]) -> dic
     )
     files = {path: environment.get_template(name).render(facts) for path, name in sorted(templates.items())}
     for path in [path for path in files if path.suffix == ".yaml"]:
-        files[path] = f"# yaml-language-server: $schema=../schemas/{_schema_kind(path)}.json\n{files[path]}"
+        files[path] = _with_schema(path, files[path])
     return files
+
+
+def _with_schema(path: PurePosixPath, text: str) -> str:
+    """Return a YAML file that names its schema to editors."""
+    return f"# yaml-language-server: $schema=../schemas/{_schema_kind(path)}.json\n{text}"
 
 
 def write_new(files: dict[PurePosixPath, str], folder: Path, *, also: Iterable[PurePosixPath] = ()) -> None:
@@ -293,8 +298,9 @@ def new(
     here = checkout is not None and Path.cwd().resolve().is_relative_to(checkout)
     folder = out or (checkout if checkout is not None and here else Path())
     in_checkout = folder.resolve() == checkout
-    beginning = begin(kind, name, language, in_checkout=in_checkout)
-    if source is not None:
+    if source is None:
+        beginning = begin(kind, name, language, in_checkout=in_checkout)
+    else:
         beginning = _copy(source, name, folder)
     also = [beginning.source] if beginning.source else []
     write_new(beginning.files, folder, also=also)
@@ -327,8 +333,7 @@ def _copy(source: str, name: str, folder: Path) -> NewFiles:
         if Path(written).suffix and (found := file.parent / written).is_file():
             there = Path(os.path.relpath(found.resolve(), (folder / path).parent.resolve())).as_posix()
             text = re.sub(rf"(?<![\w./-]){re.escape(written)}(?![\w./-])", there.replace("\\", r"\\"), text)
-    schema = f"# yaml-language-server: $schema=../schemas/{_schema_kind(path)}.json\n"
-    return NewFiles({path: schema + text}, path)
+    return NewFiles({path: _with_schema(path, text)}, path)
 
 
 def _texts(data: Any) -> Iterable[str]:

@@ -146,9 +146,29 @@ def tabular(command: Callable[..., None]) -> Callable[..., None]:
     return command
 
 
+def with_options(
+    command: Callable[..., None], called: Callable[..., None], **options: tuple[Any, Any]
+) -> Callable[..., None]:
+    """Return what is called for a command, with the command's signature and further options.
+
+    Args:
+        command: has parameters of its own.
+        called: takes them and the options by name.
+        options: name -> default and annotation.
+    """
+    kind = inspect.Parameter.KEYWORD_ONLY
+    own = inspect.signature(command, eval_str=True).parameters.values()
+    more = (
+        inspect.Parameter(name, kind, default=default, annotation=annotation)
+        for name, (default, annotation) in options.items()
+    )
+    every = [*(parameter.replace(kind=kind) for parameter in own), *more]
+    called.__signature__ = inspect.Signature(every)  # type: ignore[attr-defined]
+    return called
+
+
 def with_forms(command: Callable[..., None]) -> Callable[..., None]:
     """Return a command that also takes `--json` and `--latex`."""
-    own = inspect.signature(command, eval_str=True)
 
     @functools.wraps(command)
     def called(*, json: bool, latex: bool, **arguments: Any) -> None:
@@ -156,13 +176,7 @@ def with_forms(command: Callable[..., None]) -> Callable[..., None]:
             raise ScenarioError("--json and --latex are mutually exclusive", code="option-invalid")
         command(**arguments)
 
-    of_forms = [
-        inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=kind)
-        for name, kind in (("json", Json), ("latex", Latex))
-    ]
-    every = [parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY) for parameter in own.parameters.values()]
-    called.__signature__ = inspect.Signature([*every, *of_forms])  # type: ignore[attr-defined]
-    return called
+    return with_options(command, called, json=(False, Json), latex=(False, Latex))
 
 
 def _data_of(table: Table) -> dict[str, Any]:

@@ -331,8 +331,8 @@ def far_of(event: EventRecord, unit: str) -> str:
 def sentence(event: EventRecord) -> str:
     """Return an event in words: where, what happens, from when to when, how far."""
     until = "" if event.until is None else f" to {event.until:.2f} s"
-    far = "" if event.value is None else f": {_value(event.value, event.unit)}"
-    return f"{label_of(event)} from {_at(event)}{until}{far}"
+    far = far_of(event, event.unit)
+    return f"{label_of(event)} from {_at(event)}{until}{far and f': {far}'}"
 
 
 def _at(event: EventRecord) -> str:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from pkgutil import resolve_name
 
 import numpy as np
 
@@ -102,7 +103,7 @@ class ExportedRun:
         except ResultsError:
             return None
 
-    @property
+    @cached_property
     def signals(self) -> dict[str, np.ndarray]:
         """The recorded columns of numbers, in the order of their recording."""
         return {
@@ -127,8 +128,7 @@ def write(runs: Sequence[ExportedRun], file: Path, format: Format) -> list[Path]
     Raises:
         ResultsError: a file cannot be written, or has no place for what was recorded.
     """
-    module, _, function = format.writer.partition(":")
-    writer = getattr(importlib.import_module(f"{__package__}.{module}"), function)
+    writer = resolve_name(f"{__package__}.{format.writer}")
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
         return [file, *writer(runs, file)]

@@ -32,6 +32,7 @@ from .shapes import (
     CONE_SIZE,
     LANE,
     PER_NEWTON,
+    SIDEWAYS,
     TYRE,
     TYRE_WIDTH,
     Arrows,
@@ -42,14 +43,13 @@ from .shapes import (
     colour_of,
     frames_of,
     ground_colour,
+    strip_of,
     triangles,
 )
 
 WORLD = "road"
 GHOST = 0.4
 """Opacity of the runs after the first."""
-SIDEWAYS = np.array([np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)])
-"""Turn of a cylinder's axis from z to y."""
 
 
 def write(runs: Sequence[ExportedRun], file: Path) -> list[Path]:
@@ -228,8 +228,7 @@ def _road(update: Any, scenes: Sequence[Scene]) -> None:
         _paint(cone.color, CONE)
     for scene in scenes:
         if scene.path is not None:
-            path = scene.path[samples(scene.time, 2 * FRAMES)]
-            _line(entity, np.column_stack([path, np.full(len(path), 0.02)]), (0.5, 0.5, 0.5), 0.05)
+            _line(entity, strip_of(scene, scene.path, 0.02), (0.5, 0.5, 0.5), 0.05)
 
 
 def _car(update: Any, label: str, scene: Scene, colour: Colour, alpha: float) -> None:
@@ -245,9 +244,8 @@ def _car(update: Any, label: str, scene: Scene, colour: Colour, alpha: float) ->
         _turn(tyre.pose.orientation, SIDEWAYS)
         _point(tyre.size, (2 * scene.car.radius, 2 * scene.car.radius, TYRE_WIDTH))
         _paint(tyre.color, TYRE, alpha)
-    path = scene.position[samples(scene.time, 2 * FRAMES)]
     entity = update.entities.add(id=f"{label} path", frame_id=WORLD, frame_locked=True)
-    _line(entity, np.column_stack([path, np.full(len(path), 0.03)]), colour, 0.08)
+    _line(entity, strip_of(scene, scene.position, 0.03), colour, 0.08)
 
 
 def _moving(label: str, scene: Scene, colour: Colour) -> Iterator[tuple[int, bytes, bytes]]:

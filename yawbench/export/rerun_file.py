@@ -35,6 +35,7 @@ from .shapes import (
     CONE_SIZE,
     LANE,
     PER_NEWTON,
+    SIDEWAYS,
     TYRE,
     TYRE_WIDTH,
     Colour,
@@ -44,6 +45,7 @@ from .shapes import (
     colour_of,
     frames_of,
     ground_colour,
+    strip_of,
     triangles,
 )
 
@@ -131,8 +133,7 @@ def _road(recording: Any, scenes: Sequence[Scene]) -> None:
         recording.log("road/cones", cones, static=True)
     for number, scene in enumerate(scenes):
         if scene.path is not None:
-            path = scene.path[samples(scene.time, 2 * FRAMES)]
-            strip = np.column_stack([path, np.full(len(path), 0.02)])
+            strip = strip_of(scene, scene.path, 0.02)
             line = rr.LineStrips3D([strip], colors=[(128, 128, 128)], radii=[0.03])
             recording.log(f"road/plan/{number}", line, static=True)
 
@@ -161,7 +162,7 @@ def _car(recording: Any, base: str, scene: Scene, colour: Colour, alpha: int) ->
         tyre = rr.Cylinders3D(
             lengths=[TYRE_WIDTH],
             radii=[scene.car.radius],
-            quaternions=[rr.Quaternion(xyzw=[np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)])],
+            quaternions=[rr.Quaternion(xyzw=SIDEWAYS)],
             colors=[_rgb(TYRE, alpha)],
             fill_mode="solid",
         )
@@ -190,8 +191,7 @@ def _car(recording: Any, base: str, scene: Scene, colour: Colour, alpha: int) ->
         moving(f"{base}/yaw_moment", rr.LineStrips3D.columns(strips=arcs))
         grey = rr.LineStrips3D.from_fields(colors=[(90, 90, 90)], radii=[0.05])
         recording.log(f"{base}/yaw_moment", grey, static=True)
-    path = scene.position[samples(scene.time, 2 * FRAMES)]
-    strip = np.column_stack([path, np.full(len(path), 0.03)])
+    strip = strip_of(scene, scene.position, 0.03)
     line = rr.LineStrips3D([strip], colors=[_rgb(colour)], radii=[0.04])
     recording.log(f"road/path/{label}", line, static=True)
 

@@ -10,8 +10,10 @@ from matplotlib.colors import to_rgb
 
 from yawbench.figures.style import line_style
 from yawbench.scene.outline import CarOutline
-from yawbench.scene.scene import Scene, quaternions
+from yawbench.scene.scene import Scene, quaternions, samples
 from yawbench.vocabulary.wheels import WHEELS
+
+from .formats import FRAMES
 
 Colour = tuple[float, float, float]
 
@@ -36,6 +38,14 @@ CONE_SIZE = (0.15, 0.6)
 """Radius and height of a cone [m]."""
 TYRE_WIDTH = 0.2
 """Width of a tyre [m]; chosen: 205/60R15."""
+SIDEWAYS = np.array([np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)])
+"""Turn of a cylinder's axis from z to y."""
+
+
+def strip_of(scene: Scene, points: np.ndarray, height: float) -> np.ndarray:
+    """Return a path of a run as a line at a height above the road, shape (points, 3)."""
+    path = points[samples(scene.time, 2 * FRAMES)]
+    return np.column_stack([path, np.full(len(path), height)])
 
 
 def colour_of(number: int) -> Colour:

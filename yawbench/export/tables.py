@@ -16,7 +16,7 @@ from typing import Any
 from yawbench.foundation.errors import ResultsError
 from yawbench.foundation.safe_files import write_whole
 from yawbench.orchestrator.results.file_formats import column_of
-from yawbench.orchestrator.results.parquet_and_mdf import MdfGroup, mdf_of
+from yawbench.orchestrator.results.parquet_and_mdf import UNIT, MdfGroup, mdf_of
 
 from .formats import ExportedRun
 
@@ -28,8 +28,8 @@ def write_csv(runs: Sequence[ExportedRun], file: Path) -> list[Path]:
     """Write a row per run and instant, with units in the header."""
     from pyarrow import BufferOutputStream, csv
 
-    table = _table(runs)
-    named = [f"{one.name} [{unit}]" if (unit := _unit(one)) else one.name for one in table.schema]
+    table, units = _table(runs)
+    named = [f"{name} [{unit}]" if unit else name for name, unit in units.items()]
     sink = BufferOutputStream()
     csv.write_csv(table.rename_columns(named), sink)
     write_whole(file, sink.getvalue().to_pybytes(), named=True)
@@ -38,16 +38,19 @@ def write_csv(runs: Sequence[ExportedRun], file: Path) -> list[Path]:
 
 def write_parquet(runs: Sequence[ExportedRun], file: Path) -> list[Path]:
     """Write a row per run and instant, with units in the metadata of fields."""
+    import pyarrow as pa
     import pyarrow.parquet as pq
-    from pyarrow import BufferOutputStream
 
-    sink = BufferOutputStream()
-    pq.write_table(_table(runs), sink, compression="zstd")
+    table, units = _table(runs)
+    fields = [one.with_metadata({UNIT: units[one.name]}) if units[one.name] else one for one in table.schema]
+    sink = pa.BufferOutputStream()
+    pq.write_table(table.cast(pa.schema(fields)), sink, compression="zstd")
     write_whole(file, sink.getvalue().to_pybytes(), named=True)
     return []
 
 
-def _table(runs: Sequence[ExportedRun]) -> Any:
+def _table(runs: Sequence[ExportedRun]) -> tuple[Any, dict[str, str]]:
+    """Return the rows of all runs, and the unit of each column, "" if it has none."""
     import pyarrow as pa
 
     units: dict[str, str] = {}
@@ -63,18 +66,7 @@ def _table(runs: Sequence[ExportedRun]) -> Any:
             for name in units
         }
         parts.append(pa.table(columns))
-    table = pa.concat_tables(parts)
-    texts = {"run": "", "time": "s", **units}
-    fields = [
-        field.with_metadata({"unit": texts[field.name]}) if texts[field.name] else field
-        for field in table.schema
-    ]
-    return table.cast(pa.schema(fields))
-
-
-def _unit(field: Any) -> str:
-    unit: bytes = (field.metadata or {}).get(b"unit", b"")
-    return unit.decode()
+    return pa.concat_tables(parts), {"run": "", "time": "s", **units}
 
 
 def write_mdf(runs: Sequence[ExportedRun], file: Path) -> list[Path]:

@@ -84,8 +84,9 @@ class Pack:
 
     def files(self) -> dict[PurePosixPath, Path]:
         """Return path in the archive -> file, of the study and what it reads, with their relative paths."""
+        named = self.by_name().values()
         own = [self.study, *(path for path in self.read if self._goes_along(path))]
-        own += [fmu.path for fmu in self.planned.fmus.values() if fmu.path not in self.by_name().values()]
+        own += [fmu.path for fmu in self.planned.fmus.values() if fmu.path not in named]
         own = sorted({Path(os.path.abspath(path)) for path in own})
         above = [folder for folder in self.study.parents if folder.name == FOLDER]
         root = Path(

@@ -92,7 +92,7 @@ def degrees(amplitude: float) -> str:
 
 def run_label(ranked: RankingResult, run: RankedRun) -> str:
     """Return the label of a run: its entry, side and amplitude."""
-    title = next(score.spec.title for score in ranked.scores if score.entry == run.entry)
+    title = ranked.ranking.entries[run.entry][0].title
     return f"{title}, {'right' if run.amplitude < 0 else 'left'} first, {degrees(run.amplitude)}"
 
 
@@ -103,14 +103,14 @@ MOST_NOTES = 4
 def lost_cells(ranked: RankingResult) -> list[str]:
     """Return why cars were lost in the worst runs of cells, beside the best run, as their records tell."""
     notes = []
-    for cell in (cell for score in ranked.scores for cell in score.cells.values()):
+    for cell in (cell for score in ranked.scores for cell in score.cells.values() if not cell.worst.passed):
         shown = [run for run in (cell.worst, best_beside(ranked.scores, cell)) if run]
         courses = [
             (run_label(ranked, run), load_record(run.results).events)
             for run in shown
             if run.results is not None and (run.results / RUN_FILE).is_file()
         ]
-        if courses and not cell.worst.passed:
+        if courses:
             title = ranked.ranking.conditions[cell.condition].title
             notes += [f"{title}: {note}" for note in lost_notes(courses) if note.startswith(courses[0][0])]
     return notes[:MOST_NOTES] + [f"{len(notes) - MOST_NOTES} more cells: see the page"] * (

@@ -48,9 +48,10 @@ PLANES = (
 def planes_of(runs: Sequence[Results]) -> tuple[list[View], list[Curve]]:
     """Return the views of the planes whose signals any run has, and their curves."""
     views = [view for view in PLANES if any(_has(run, view) for run in runs)]
-    curves = [*_stability()] + [
-        curve for number, run in enumerate(runs) for curve in (*_friction(run, number), *_axles(run, number))
-    ]
+    curves = [*_stability()]
+    for number, run in enumerate(runs):
+        if (friction := _first_friction(run)) is not None:
+            curves += [*_friction(run, friction, number), *_axles(run, friction, number)]
     return views, curves
 
 
@@ -65,10 +66,7 @@ def _stability() -> Iterator[Curve]:
         yield Curve("sideslip", "sideslip_rate", "stability index 1", beta.tolist(), rate.tolist())
 
 
-def _friction(run: Results, number: int) -> Iterator[Curve]:
-    friction = _first_friction(run)
-    if friction is None:
-        return
+def _friction(run: Results, friction: float, number: int) -> Iterator[Curve]:
     held = friction * G
     angle = np.linspace(0.0, 2.0 * np.pi, POINTS)
     x, y = (held * np.sin(angle)).tolist(), (held * np.cos(angle)).tolist()
@@ -82,11 +80,10 @@ def _friction(run: Results, number: int) -> Iterator[Curve]:
             yield Curve("sideslip", "yaw_rate", text, beta, [side * held / speed] * POINTS, number)
 
 
-def _axles(run: Results, number: int) -> Iterator[Curve]:
-    friction = _first_friction(run)
+def _axles(run: Results, friction: float, number: int) -> Iterator[Curve]:
     for wheels in AXLES.values():
         loads = [columns_of(run, f"vertical_load_{wheel}") for wheel in wheels]
-        if friction is None or not all(loads):
+        if not all(loads):
             continue
         grip = friction * sum(float(run.columns[column[0]][0]) for column in loads)
         slip = np.linspace(-WIDEST, WIDEST, POINTS).tolist()

@@ -18,8 +18,8 @@ from yawbench.foundation.errors import ResultsError, ScenarioError
 from yawbench.foundation.messages import listed
 from yawbench.foundation.safe_files import write_whole
 
-FORMATS = (".gif", ".webp", ".png")
-"""Endings of files of moving pictures: GIF, WebP, and PNG with frames (APNG)."""
+FORMATS = {".gif": "GIF", ".webp": "WEBP", ".png": "PNG"}
+"""Ending of a file of moving pictures -> its format; a PNG has frames (APNG)."""
 CAMERAS = ("chase", "side", "fixed", "orbit", "cars", "whole")
 """Cameras of the page: four in space, and two from above."""
 RATE = 20
@@ -69,7 +69,7 @@ def write_video(page: str, file: Path, *, camera: str, speed: float) -> int:
     frames = [Image.open(io.BytesIO(picture)).convert("RGB") for picture in _frames(page, camera, speed)]
     data = io.BytesIO()
     first, *others = frames
-    kind = {".gif": "GIF", ".webp": "WEBP", ".png": "PNG"}[file.suffix]
+    kind = FORMATS[file.suffix]
     own: dict[str, Any] = {"quality": 80} if kind == "WEBP" else {}
     first.save(data, kind, save_all=True, append_images=others, duration=1000 // RATE, loop=0, **own)
     try:

@@ -15,7 +15,7 @@ recorded, such as the pitch of a model that has none, are zero, and named in `mi
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -28,7 +28,7 @@ from yawbench.orchestrator.results.run_record import EventRecord
 from yawbench.orchestrator.scenario.overrides import with_changes
 
 from .outline import CarOutline, Places, outline_of, places_of
-from .wheel_motion import friction_of, steer_of, torques_of, travel_of
+from .wheel_motion import friction_of, stacked, steer_of, torques_of, travel_of
 
 POSE = {"x": "position_x", "y": "position_y", "yaw": "yaw_angle"}
 """Signals without which there is no scene."""
@@ -86,7 +86,7 @@ class Scene:
     wind: np.ndarray
     path: np.ndarray | None
     events: Sequence[EventRecord] = ()
-    missing: Sequence[str] = field(default=())
+    missing: Sequence[str] = ()
 
     @cached_property
     def body(self) -> np.ndarray:
@@ -174,7 +174,7 @@ def scene_of(run: Results, events: Sequence[EventRecord] = ()) -> Scene:
 
     def four(signal: str) -> np.ndarray:
         if columns := columns_of(run, signal):
-            return np.stack([np.asarray(run.columns[column], float) for column in columns], axis=1)
+            return stacked(run, columns)
         missing.append(signal)
         return np.zeros((rows, 4))
 

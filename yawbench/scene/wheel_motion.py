@@ -153,13 +153,12 @@ def _lift(
 
 
 def _of_plant(run: Results) -> dict[str, float]:
-    numbers: dict[str, float] = {}
-    for instance in run.instances_of_role("plant"):
-        fmu = run.record.fmus[instance]
-        for name, value in {**fmu.defaults, **fmu.parameters}.items():
-            if isinstance(value, (int, float)):
-                numbers[name] = float(value)
-    return numbers
+    return {
+        name: float(value)
+        for parameters in parameters_of(run, "plant")
+        for name, value in parameters.items()
+        if isinstance(value, (int, float))
+    }
 
 
 def _ride_of(run: Results) -> Any:

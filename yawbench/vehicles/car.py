@@ -154,8 +154,8 @@ class CarParameters(Parameters):
             self.system.report(given.where, str(error), code_of(error))
             return numbers
         changed = [name for name, value in after.items() if value != numbers.get(name)]
+        origin = ValueOrigin.derived(f"with a load of {load}")
         for name in changed:
-            origin = ValueOrigin.derived(f"with a load of {load}")
             for instance in self.takers(name):
                 self.give(instance, name, Given(after[name], origin, self._where), f"{name}: ")
         before, now = car_of(numbers).values, car_of(after).values

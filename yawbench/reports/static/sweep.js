@@ -9,7 +9,6 @@ const MOST_NAMES = 16; // on an axis, so that none touches the next
 const NEAR_LINE = 14; // pixels
 const BESIDE_RUNS = 7; // runs opened with a point: as many as there are colours
 
-const escaped = (text) => String(text).replace(/[&<>"]/g, (one) => `&#${one.charCodeAt(0)};`);
 const signed = (text) => text.replace('-', '−');
 
 function opacityOf(shade) { return (0.07 + (0.5 * shade) / (SHADES - 1)).toFixed(2); }

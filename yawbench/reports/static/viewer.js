@@ -94,9 +94,6 @@ class InAddress {
   implied() { return {}; }
 }
 
-// Further parts of every viewer, from other files: functions of the viewer, called when its panels are drawn.
-const viewerParts = [];
-
 class Viewer extends InAddress {
   constructor(root, data, runs) {
     super();
@@ -138,7 +135,6 @@ class Viewer extends InAddress {
       this.subscribe(() => this.road.draw(this.density));
     }
     this.events = new Events(this);
-    for (const part of viewerParts) part(this);
     this.root.classList.add('yv-ready');
   }
 

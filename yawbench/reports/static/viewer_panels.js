@@ -377,7 +377,7 @@ class Panel {
     });
     const end = (event) => {
       if (!down.has(event.pointerId)) return;
-      const [now] = [at(event)];
+      const now = at(event);
       down.delete(event.pointerId);
       this.box.remove();
       if (begun?.how === 'box' && begun.moved) this.boxed(begun.points[0], now);

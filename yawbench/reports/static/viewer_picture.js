@@ -56,7 +56,7 @@ class SvgPaper {
   fillText(words, x, y) {
     const anchor = {left: 'start', center: 'middle', right: 'end'}[this.textAlign];
     const size = parseFloat(this.font);
-    this.parts.push(`<text x="${x.toFixed(1)}" y="${(y + 0.35 * size).toFixed(1)}" font-size="${size}" text-anchor="${anchor}" fill="${this.fillStyle}">${escapedXml(words)}</text>`);
+    this.parts.push(`<text x="${x.toFixed(1)}" y="${(y + 0.35 * size).toFixed(1)}" font-size="${size}" text-anchor="${anchor}" fill="${this.fillStyle}">${escaped(words)}</text>`);
   }
 
   text(width, height) {
@@ -64,7 +64,7 @@ class SvgPaper {
   }
 }
 
-function escapedXml(words) { return String(words).replace(/[&<>"]/g, (one) => `&#${one.charCodeAt(0)};`); }
+function escaped(words) { return String(words).replace(/[&<>"]/g, (one) => `&#${one.charCodeAt(0)};`); }
 
 // Round numbers within a range, about as far apart as asked.
 function splitsOf({min, max}, count) {

@@ -1,14 +1,16 @@
 // The road from above and a close-up of each car, at the cursor's time; plays.
 
-const IN_SPACE = ['roll_angle', 'pitch_angle', 'heave', 'wind_force_y'];
+// Channels that a run may have, beside its place; sideslip is NaN while the car stands.
+const MORE = [
+  'yaw_rate', 'steer_angle', 'yaw_moment', 'cone_overrun', 'sideslip', 'roll_angle', 'pitch_angle', 'heave', 'wind_force_y',
+];
 
 // What scene and close-ups need of a run: channels in SI units at every recorded row.
 function channelsOf(run) {
   const {road} = run;
   const column = (name) => (road[name] ? run.column(road[name]) : null);
   const channels = {time: run.shifted, x: column('x'), y: column('y'), yaw: unwrapped(column('yaw'))};
-  for (const name of ['yaw_rate', 'steer_angle', 'yaw_moment', 'cone_overrun', ...IN_SPACE]) if (road[name]) channels[name] = column(name);
-  if (road.sideslip) channels.sideslip = column('sideslip'); // NaN while the car stands
+  for (const name of MORE) if (road[name]) channels[name] = column(name);
   if (road.path_offset) {
     const off = column('path_offset');
     channels.path_y = channels.y.map((y, i) => y - off[i]);
