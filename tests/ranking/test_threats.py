@@ -256,7 +256,7 @@ def test_gains_are_compared_among_all_laws_and_among_groups_of_them(shipped):
     compared = compared_gains(levels_of(shipped, position))
     assert compared is not None
     assert {len(means) for means in compared.means.values()} == {6}  # of the study, and five seeds
-    assert [*compared.groups] == ["all 10 laws", *shipped.spec.settings["seeds"].groups]
+    assert [*compared.groups] == ["all 18 laws", *shipped.spec.settings["seeds"].groups]
     for gains in compared.groups.values():
         assert gains.gains.value == pytest.approx(0.1 / math.sqrt(2), rel=0.05)
         assert gains.seeds.value == pytest.approx(0.002, rel=0.3)

@@ -185,10 +185,6 @@ class ThreatsSpec(StrictModel):
     published: PublishedSpec | None = Field(None, description="Results found before")
     cars: list[str] = Field(min_length=1, description="Names of cars in the ranking file")
     scenarios: dict[str, dict[str, str]] = Field({}, description="Car -> scenario -> scenario in its place")
-    without: list[str] = Field([], description="Entries of the ranking that are not judged")
-    changes: dict[str, dict[TargetText, Scalar]] = Field(
-        {}, description="Car -> further overrides of its own"
-    )
     threats: dict[str, ThreatSpec] = Field(min_length=1, description="Name -> threat")
     settings: dict[str, SettingSpec] = Field(min_length=1, description="Name -> setting; the first ranks")
     disciplines: dict[str, DisciplineSpec] = Field(
@@ -197,9 +193,6 @@ class ThreatsSpec(StrictModel):
 
     @model_validator(mode="after")
     def _consistent(self) -> ThreatsSpec:
-        for name in self.changes:
-            if name not in self.cars:
-                raise ValueError(f"changes: there is no {name!r}{hint(name, self.cars, lead='known')}")
         for group in ("threats", "settings", "disciplines"):
             for name, spec in getattr(self, group).items():
                 for key, known in (("cars", self.cars), ("threats", self.threats)):
@@ -311,19 +304,6 @@ def load_threats(
                 f"{hint(name, ranking.spec.cars, lead='known')}",
                 code="condition-unknown",
             )
-    cars = {
-        name: car.model_copy(update={"set": {**car.set, **spec.changes.get(name, {})}})
-        for name, car in ranking.spec.cars.items()
-    }
-    for name in spec.without:
-        if name not in ranking.entries:
-            raise ScenarioError(
-                f"{path}: without: {ranking.path.name} has no entry {name!r}"
-                f"{hint(name, ranking.entries, lead='known')}",
-                code="entry-unknown",
-            )
-    judged = {name: entry for name, entry in ranking.entries.items() if name not in spec.without}
-    ranking = replace(ranking, spec=ranking.spec.model_copy(update={"cars": cars}), entries=judged)
     if REFERENCE not in ranking.entries:
         raise ScenarioError(
             f"{ranking.path}: has no entry {REFERENCE!r}, to which scores are relative", code="entry-unknown"
