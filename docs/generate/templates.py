@@ -12,7 +12,7 @@ from typing import Any
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from yawbench.figures.display import shown
-from yawbench.foundation.messages import listed
+from yawbench.foundation.messages import counted, listed
 
 DOCS = Path(__file__).resolve().parents[1]
 TEMPLATES = Path(__file__).resolve().parent / "pages"
@@ -25,14 +25,14 @@ def rendered(pattern: str, names: Mapping[str, Any]) -> dict[Path, str]:
 
     Args:
         pattern: of the templates' files, relative to `TEMPLATES`.
-        names: what expressions can name, beside `max`, `min` and `listed`.
+        names: what expressions can name, beside `max`, `min`, `counted` and `listed`.
     """
     environment = Environment(
         loader=FileSystemLoader(TEMPLATES), undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True,
         keep_trailing_newline=True,
     )  # fmt: skip
     environment.filters |= FILTERS
-    environment.globals |= {"max": max, "min": min, "listed": listed, **names}
+    environment.globals |= {"max": max, "min": min, "counted": counted, "listed": listed, **names}
     return {
         DOCS / file.stem: reflowed(environment.get_template(str(file.relative_to(TEMPLATES))).render())
         for file in sorted(TEMPLATES.glob(pattern))
