@@ -109,6 +109,16 @@ def size_of(file: str) -> tuple[float, float]:
     return float(root.get("width").removesuffix("pt")), float(root.get("height").removesuffix("pt"))
 
 
+def test_a_legend_is_filled_as_lines_of_a_text_are():
+    labels = ["no control", "fuzzy controller on sideslip", "adaptive fuzzy neural network"]
+    with matplotlib.rc_context({**STYLES["ieee"], "figure.figsize": (88 / 25.4, 60 / 25.4)}):
+        figure = draw([LabelledRun(label, car(k + 1.0)) for k, label in enumerate(labels)], ["sideslip"])
+        rows = [[text.get_text() for text in row.get_texts()] for row in figure.legends]
+        boxes = [row.get_window_extent() for row in figure.legends]
+    assert rows == [labels[:2], [labels[2], "reference"]]
+    assert max(box.x1 for box in boxes) <= figure.bbox.x1 and boxes[1].y1 <= boxes[0].y0
+
+
 def test_panels_without_room_are_refused(run, capsys):
     assert status_of("plot", run, "--style", "ieee", "--size", "88x40mm", "--out", "fig.pdf") == 2
     assert each_mentions(capsys.readouterr().err, ("fig", "88", "40 mm", "--panel", "--size"))

@@ -213,7 +213,7 @@ class Viewer extends InAddress {
   initial() {
     return {
       view: 0, ...this.viewed(0), span: null, heights: {}, tall: [], time: this.data.still, pin: null, lit: null,
-      difference: false, tolerance: 0, camera: 'cars', look: [0, 0], near: 1, offsets: {},
+      difference: false, tolerance: 0, camera: 'cars', look: [0, 0], near: 1, offsets: {...this.data.offsets},
     };
   }
 
