@@ -140,7 +140,7 @@ def test_decoded_samples_equal_those_of_the_car(chromium: Browser, made, page):
 
 
 def test_a_recording_of_another_time_begins_with_the_run_so_that_the_slider_ends_with_the_data(made):
-    folder, run, validation = made
+    _, _, validation = made
     (plot,) = validation.plots
     late = replace(plot, tests=[plot.tests[0], replace(plot.tests[1], time=plot.tests[1].time + 749.0)])
     data = data_in(validation_page(replace(validation, plots=[late])))

@@ -30,6 +30,8 @@ from tests.reports.flaws import (
 from tests.reports.made_up import HALF_A_CAR, data_in, unpacked
 from yawbench.cli import main
 from yawbench.foundation.errors import ScenarioError
+from yawbench.metrics.verdict import Status, worded
+from yawbench.reports.overview_page import held
 from yawbench.reports.page_parts import with_minus
 from yawbench.reports.planes import PLANES
 from yawbench.studies.load_experiment import found_studies, load_experiment
@@ -320,6 +322,13 @@ def test_several_studies_make_one_page_with_an_overview(overview):
         for file in (code for code in texts(study, "details li code") if code.endswith(".svg")):
             assert (page.parent / file).is_file()
     assert len([*(overview.folder / "data").glob("*.js")]) == 3
+
+
+def test_checks_that_were_not_judged_are_not_counted_among_those_that_do_not_hold():
+    one = {status: worded(status, "checks") for status in Status}
+    assert held([one[Status.NOT_JUDGED]] * 2) == "2 not judged"
+    assert held([one[Status.PASSED], one[Status.FAILED], one[Status.NOT_JUDGED]]) == "1 of 2, 1 not judged"
+    assert (held([one[Status.PASSED], one[Status.SENSITIVE]]), held([])) == ("1 of 2", "")
 
 
 @pytest.mark.parametrize(("width", "colours"), looks(PHONE, DESK, narrow=False))

@@ -16,7 +16,8 @@ import numpy as np
 
 from yawbench.foundation.errors import ResultsError
 from yawbench.foundation.messages import fold
-from yawbench.metrics.expressions import reference_of
+from yawbench.metrics.expressions import TimeWindow, reference_of
+from yawbench.metrics.expressions import during as said_during
 from yawbench.orchestrator.plan import Override
 from yawbench.orchestrator.recordings.gaps import gaps_noted
 from yawbench.orchestrator.results.run_record import RunStatus
@@ -203,6 +204,24 @@ def minus(runs: Sequence[LabelledRun], baseline: LabelledRun) -> list[LabelledRu
         }
         difference = Difference(results.folder, results.time, columns, results.units, results.record)
         found.append(LabelledRun(f"{label} minus {baseline.label}", difference))
+    return found
+
+
+def within(runs: Sequence[LabelledRun], window: TimeWindow) -> list[LabelledRun]:
+    """Return the rows of runs within a time span [s].
+
+    Raises:
+        ResultsError: a run has fewer than two there.
+    """
+    found = []
+    for label, results in runs:
+        rows = (results.time >= window[0]) & (results.time <= window[1])
+        if np.count_nonzero(rows) < 2:
+            raise ResultsError(
+                f"{results.where}: nothing to draw{said_during(window)}", code="nothing-to-draw"
+            )
+        columns = {name: values[rows] for name, values in results.columns.items()}
+        found.append(LabelledRun(label, replace(results, time=results.time[rows], columns=columns)))
     return found
 
 

@@ -239,7 +239,7 @@ class Viewer extends InAddress {
       span: (v) => v === null || isSpan(v),
       heights: (v) => isRecord(v) && Object.values(v).every(isSpan), tall: (v) => Array.isArray(v) && v.every((one) => typeof one === 'string'),
       pin: (v) => v === null || Number.isFinite(v),
-      lit: (v) => v === null || (Array.isArray(v) && v.length === 3 && typeof v[0] === 'string' && this.known(v[0]) && (v[1] === null || Number.isFinite(v[1])) && typeof v[2] === 'string'),
+      lit: (v) => v === null || (Array.isArray(v) && v.length === 3 && typeof v[0] === 'string' && (v[1] === null || Number.isFinite(v[1])) && typeof v[2] === 'string'),
       time: Number.isFinite, difference: (v) => typeof v === 'boolean', tolerance: (v) => Number.isFinite(v) && v >= 0,
       x: (v) => this.axes().includes(v), camera: (v) => ['cars', 'whole', ...CAMERAS].includes(v) || isRun(v),
       look: (v) => Array.isArray(v) && v.length === 2 && v.every(Number.isFinite),
@@ -257,7 +257,7 @@ class Viewer extends InAddress {
   restore() {
     if (!super.restore()) return false;
     const {lit} = this.state;
-    if (!lit || readAddress(this.key)?.has('time')) return true;
+    if (!lit || !this.known(lit[0]) || readAddress(this.key)?.has('time')) return true;
     const own = this.state.panels.find((spec) => spec.split(',').includes(lit[0])) ?? lit[0];
     this.state.panels = [own, ...this.state.panels.filter((spec) => spec !== own)];
     const run = this.lead();
@@ -553,6 +553,7 @@ class Viewer extends InAddress {
     this.readTheme();
     this.shift();
     this.drawTable();
+    this.tellMissing();
     const holder = this.find('panels');
     this.panels = this.state.panels.map((spec) => new Panel(this, spec));
     this.root.classList.toggle('yv-pinned', this.state.pin !== null);
@@ -689,6 +690,16 @@ class Viewer extends InAddress {
     try { take(); } catch (error) { problem = error.message; }
     field.setCustomValidity(problem);
     field.reportValidity();
+  }
+
+  // A claim may judge a signal that the page does not carry: which, and where it is.
+  tellMissing() {
+    const {lit} = this.state;
+    const place = this.find('missing');
+    place.hidden = !lit || this.known(lit[0]);
+    if (place.hidden) return;
+    const command = plotOf(this.runs.filter((run) => this.shows(run)), ['--page', '--panel', lit[0]]);
+    place.replaceChildren(`Judged: ${lit[2]}. This page does not carry ${lit[0]}${command ? '; it is in the page of ' : ''}`, ...(command ? [made('code', command)] : []), '.');
   }
 
   // The command that draws what is shown.
