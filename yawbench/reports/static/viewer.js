@@ -206,7 +206,7 @@ class Viewer extends InAddress {
     find('add').list.append(...names.map(([name, {label}]) => made('option', label, {value: name})));
     if (data.runs.some((run) => run.road)) return;
     find('main').classList.add('yv-alone');
-    find('play').remove();
+    for (const one of this.root.querySelectorAll('.yv-play')) one.remove();
     find('road').remove();
   }
 
@@ -360,7 +360,7 @@ class Viewer extends InAddress {
     return run.grain(name) + (this.state.difference && run !== this.baseline ? this.baseline.grain(name) : 0);
   }
 
-  // The signals of a text of the reader, by name, by variable, by label or by a part of one, as a panel names them.
+  // The signals of a text of the reader, by name, by variable, by label or by words of these, as a panel names them.
   // Throw a sentence for the reader if there are none or several.
   named(text) {
     const signal = (part) => (/^ [-+] $/.test(part) ? part : this.signalOf(part.trim()));
@@ -371,17 +371,20 @@ class Viewer extends InAddress {
     const {signals, partial} = this.data;
     if (text in signals) return text;
     const wanted = text.toLowerCase();
-    const words = (name) => {
-      const {label, unit, fed = []} = signals[name];
-      return [name, name.slice(name.indexOf('.') + 1), ...fed, label, unit ? `${label} in ${unit}` : label].map((one) => one.toLowerCase());
-    };
-    const every = Object.keys(signals);
-    const whole = every.filter((name) => words(name).includes(wanted));
-    const found = whole.length ? whole : every.filter((name) => words(name).some((one) => one.includes(wanted)));
-    if (found.length === 1) return found[0];
-    const more = found.length > NAMED ? ` and ${found.length - NAMED} more` : '';
-    if (found.length) throw new Error(`${text} may be ${found.slice(0, NAMED).join(', ')}${more}`);
-    throw new Error(partial ? `this page has no signal ${text}; yawbench plot --page shows all that was recorded` : `no signal ${text} was recorded`);
+    const told = Object.entries(signals).map(([name, {label, unit, fed = []}]) => ({
+      name, says: [name, name.slice(name.indexOf('.') + 1), ...fed, label, unit ? `${label} in ${unit}` : label].map((one) => one.toLowerCase()),
+    }));
+    const words = wanted.split(/[^\p{L}\p{N}]+/u).filter(Boolean);
+    const share = ({says}) => words.filter((word) => says.some((one) => one.includes(word))).length;
+    const whole = told.filter(({says}) => says.includes(wanted));
+    const most = Math.max(...told.map(share), 1);
+    const found = whole.length ? whole : told.filter((one) => share(one) === most);
+    const sure = whole.length || most === words.length;
+    if (found.length === 1 && sure) return found[0].name;
+    const names = found.slice(0, NAMED).map(({name}) => name).join(', ') + (found.length > NAMED ? ` and ${found.length - NAMED} more` : '');
+    if (sure && found.length) throw new Error(`${text} may be ${names}`);
+    const where = partial ? '; yawbench plot --page shows all that was recorded' : '';
+    throw new Error(`${partial ? 'this page has' : 'the runs have'} no signal ${text}${names ? `; near are ${names}` : ''}${where}`);
   }
 
   known(spec) { return spec.split(',').every((name) => partsOf(name.trim()).every((part) => part in this.data.signals)); }
@@ -706,7 +709,7 @@ class Viewer extends InAddress {
   tellCommand() {
     const command = commandOf(this);
     this.find('command').textContent = command;
-    this.find('command').hidden = !command;
+    this.find('told').hidden = !command;
   }
 
   // The view on a canvas, and as SVG.

@@ -107,7 +107,7 @@ class Road {
   constructor(viewer) {
     Object.assign(this, {viewer, playing: false, rate: 1, view: {camera: 'cars'}});
     const find = viewer.find;
-    Object.assign(this, {scene: find('scene'), button: find('play'), closeUps: find('closeups'), camera: find('camera')});
+    Object.assign(this, {scene: find('scene'), buttons: viewer.root.querySelectorAll('.yv-play'), closeUps: find('closeups'), camera: find('camera')});
     this.cars = viewer.runs.filter((run) => run.road && run.road.x);
     for (const run of this.cars) {
       run.channels = channelsOf(run);
@@ -120,7 +120,7 @@ class Road {
       const [low, high] = extremes(run.channels.yaw_moment || [], [0, 0]);
       return Math.max(high, -low);
     }), 0);
-    this.button.addEventListener('click', () => this.toggle());
+    for (const button of this.buttons) button.addEventListener('click', () => this.toggle());
     find('rate').addEventListener('change', (event) => { this.rate = Number(event.target.value); });
     this.camera.addEventListener('change', (event) => {
       const chosen = event.target.value;
@@ -166,7 +166,7 @@ class Road {
       return figure;
     }));
     const chosen = String(viewer.state.camera);
-    const views = [['cars', this.shown.length > 1 ? 'all cars' : 'car'], ...(this.shown.length > 1 ? this.shown.map((run) => [String(run.number), run.label]) : []), ['whole', 'whole path'], ...CAMERAS.map((one) => [one, `3-D: ${one}`])];
+    const views = [['cars', this.shown.length > 1 ? 'all cars' : 'car'], ...(this.shown.length > 1 ? this.shown.map((run) => [String(run.number), run.label]) : []), ['whole', 'whole path'], ...CAMERAS.map((one) => [one, `3-D: ${SPACE[one].says}`])];
     this.camera.replaceChildren(...views.map(([value, words]) => new Option(words, value)));
     this.camera.value = views.some(([value]) => value === chosen) ? chosen : 'cars';
   }
@@ -183,7 +183,7 @@ class Road {
     this.states = states;
     this.inSpace = CAMERAS.includes(chosen) && this.shown.length > 0;
     this.scene.classList.toggle('yv-space', this.inSpace);
-    this.scene.ariaLabel = this.inSpace ? `The cars in three dimensions, ${chosen} camera` : 'The road from above';
+    this.scene.ariaLabel = this.inSpace ? `The cars in three dimensions, ${SPACE[chosen].says}` : 'The road from above';
     if (!this.shown.length) { surface(this.scene, density); return; }
     if (this.inSpace) {
       const {look, near} = viewer.state;
@@ -203,7 +203,7 @@ class Road {
     if (!this.touched || viewer.state.time >= end) viewer.state.time = start;
     this.touched = true;
     this.playing = true;
-    this.button.textContent = 'Pause';
+    for (const button of this.buttons) button.textContent = 'Pause';
     let before = null;
     const next = (now) => {
       if (!this.playing) return;
@@ -220,6 +220,6 @@ class Road {
   pause() {
     this.playing = false;
     this.touched = true;
-    this.button.textContent = 'Play';
+    for (const button of this.buttons) button.textContent = 'Play';
   }
 }

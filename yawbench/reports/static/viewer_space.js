@@ -1,13 +1,13 @@
 // The scene in three dimensions on a canvas: cars with roll and pitch, wheels, forces, cones, ground, from four
 // cameras. Axes are those of ISO 8855: x forward, y to the left, z up. One car is solid, the others are ghosts.
 
-const CAMERAS = ['chase', 'side', 'fixed', 'orbit'];
 const SPACE = {
-  chase: {turn: Math.PI, rise: 0.3, far: 9, with: true}, // where the eye is: angle from the car's or the road's
-  side: {turn: -Math.PI / 2, rise: 0.12, far: 8, with: true}, // x axis, angle above the road, distance [m];
-  fixed: {turn: -2.0, rise: 0.16, far: 30, with: false}, // whether it turns with the car. Chosen: all of the car
-  orbit: {turn: -2.4, rise: 0.45, far: 12, with: false}, // and of its forces in sight
-};
+  chase: {says: 'from behind', turn: Math.PI, rise: 0.3, far: 9, with: true}, // where the eye is: angle from the
+  side: {says: 'from the side', turn: -Math.PI / 2, rise: 0.12, far: 8, with: true}, // car's or the road's x axis,
+  fixed: {says: 'from the roadside', turn: -2.0, rise: 0.16, far: 30, with: false}, // angle above the road,
+  orbit: {says: 'from around', turn: -2.4, rise: 0.45, far: 12, with: false}, // distance [m]; whether it turns with
+}; // the car. Chosen: all of the car and of its forces in sight
+const CAMERAS = Object.keys(SPACE);
 const NEAREST = 0.3; // what is nearer to the eye is not drawn [m]
 const SEEN = 90; // how far ground and cones are drawn [m]; chosen: beyond, they are specks
 const FIELD = 1.1; // width of the picture over its distance; chosen: an angle of 58 degrees
