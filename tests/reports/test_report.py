@@ -341,7 +341,7 @@ def test_a_claim_of_the_overview_shows_its_runs_from_the_side_file_of_its_study(
     chromium.wait_for("document.querySelector('.choosing').dataset.shown === 'whole-study'")
     chromium.wait_for("document.querySelector('.chosen .yv-ready')")
     assert chromium.run("return document.querySelectorAll('*').length") <= 2000
-    links = chromium.run("return [...document.querySelectorAll('ol.plain a')].map((one) => one.hash)")
+    links = chromium.run("return [...document.querySelectorAll('table.papers a.verdict')].map((one) => one.hash)")
     assert len(links) == 6
     for link in (links[5], links[4], links[1]):
         wanted = re.findall(r"shown=(\[[\d,]*\])", link)[0]
@@ -351,6 +351,9 @@ def test_a_claim_of_the_overview_shows_its_runs_from_the_side_file_of_its_study(
         chromium.wait_for("document.querySelector('.chosen .yv-ready')")
         shown = "JSON.stringify(document.querySelector('.chosen .yv').viewer.state.shown)"
         chromium.wait_for(f"{shown} === '{wanted}'")
+        chromium.wait_for(f"document.querySelectorAll('#{study} ol.plain > li').length === 2")
+        opened = "return [...document.querySelectorAll('section > details[open]')]"
+        assert chromium.run(f"{opened}.map((one) => one.parentElement.id)") == [study]
     assert all(one.startswith("file://") for one in chromium.requests())
     assert [one for one in flaws(chromium) if not one.startswith("fetched")] == []
     assert inaccessible(chromium, colours) == []

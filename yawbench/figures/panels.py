@@ -30,7 +30,7 @@ from yawbench.vocabulary.wheels import WHEEL_NAMES, wheels
 
 from .display import LabelledRun, digits_of, in_formula, shown_unit, unit_of_signal
 from .phase_portrait import curves_of, draw_portrait, signals_of, spread_rows
-from .style import ROW, WIDTH, line_style, literal, note_above, reference_style, style_of_run
+from .style import ROW, WIDTH, line_style, literal, note_beyond, reference_style, style_of_run
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -173,8 +173,7 @@ def _limit(axes: Axes, scale: float, lines: list[tuple[str, float]], unit: str) 
     largest = 1.5 * factor * max(scale, *(peak for _, peak in lines if peak <= OFF_SCALE * scale))
     axes.set_ylim(-largest, largest)
     room = "\N{NO-BREAK SPACE}"  # a unit stays with its number
-    note = "; ".join(f"{label}, up to {digits_of(peak * factor)}{room}{text}" for label, peak in lost)
-    note_above(axes, f"beyond the axes: {note}")
+    note_beyond(axes, ((label, f"{digits_of(peak * factor)}{room}{text}") for label, peak in lost))
 
 
 def _draw_error(axes: Axes, runs: Sequence[LabelledRun], signal: str, whole: bool) -> None:

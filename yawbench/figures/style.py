@@ -263,8 +263,9 @@ def _characters(axes: Axes) -> int:
     return int(wide * 72 / (CHARACTER * rcParams["font.size"]))
 
 
-def note_above(axes: Axes, note: str) -> None:
-    """Write a note between a panel and its title."""
+def note_beyond(axes: Axes, lines: Iterable[tuple[str, str]]) -> None:
+    """Write between a panel and its title which lines (label, how far they go) leave the axes."""
+    note = f"beyond the axes: {'; '.join(f'{label}, up to {far}' for label, far in lines)}"
     rows = textwrap.wrap(literal(note), _characters(axes) if own_size() else NOTE_WIDTH)
     axes.set_title(axes.get_title(loc="left"), pad=6 + 10 * len(rows))
     axes.annotate(

@@ -17,13 +17,7 @@ from yawbench.metrics.verdict import Status, VerdictText
 
 from .page_parts import SIGNS, Page, render
 from .study_page import VIEW, StudyPage, in_sentence
-from .viewer import (
-    DATA,
-    assets,
-    embedded,
-    tidy_sides,
-    write_side,
-)
+from .viewer import DATA, assets, embedded, tidy_sides, write_side
 
 OVERVIEW = "Yaw-stability control: what papers say, and what comes out"
 """Title of the overview."""

@@ -460,7 +460,7 @@ def viewer_of(
             (lively, view) for view in _views(spec, title_of(findings, spec), [*shown, *beside]) if shown
         ]
     ordered = [view for _, view in sorted(drawn, key=lambda item: -item[0])]
-    settings = Settings([*views, *ordered], largest=LARGEST)
+    settings = Settings([*views, *ordered] or [View()], largest=LARGEST)
     runs = [*named.values(), *measured]
     alike = filtered_alike([run.results for run in runs])
     runs = [LabelledRun(run.label, results) for run, results in zip(runs, alike, strict=True)]

@@ -371,8 +371,8 @@ class Viewer extends InAddress {
     const {signals, partial} = this.data;
     if (text in signals) return text;
     const wanted = text.toLowerCase();
-    const told = Object.entries(signals).map(([name, {label, unit, fed = []}]) => ({
-      name, says: [name, name.slice(name.indexOf('.') + 1), ...fed, label, unit ? `${label} in ${unit}` : label].map((one) => one.toLowerCase()),
+    const told = Object.entries(signals).map(([name, signal]) => ({
+      name, says: [name, name.slice(name.indexOf('.') + 1), ...signal.fed ?? [], signal.label, inUnit(signal)].map((one) => one.toLowerCase()),
     }));
     const words = wanted.split(/[^\p{L}\p{N}]+/u).filter(Boolean);
     const share = ({says}) => words.filter((word) => says.some((one) => one.includes(word))).length;
@@ -406,8 +406,7 @@ class Viewer extends InAddress {
     const {x} = this.state;
     if (x === 'time') return 't in s';
     if (x === 'distance') return 'distance in m';
-    const {label, unit} = this.data.signals[x];
-    return unit ? `${label} in ${unit}` : label;
+    return inUnit(this.data.signals[x]);
   }
 
   whole() {
@@ -671,17 +670,15 @@ class Viewer extends InAddress {
       if (this.state.tolerance) this.state.difference = true;
       this.refresh();
     });
-    this.find('all').addEventListener('click', () => this.showWhole());
-    this.find('pin').addEventListener('click', () => this.setPin());
-    this.find('undo').addEventListener('click', () => this.undo());
-    this.find('reset').addEventListener('click', () => this.reset());
-    this.find('in').addEventListener('click', () => this.zoom(1.6));
-    this.find('out').addEventListener('click', () => this.zoom(1 / 1.6));
-    this.find('csv').addEventListener('click', () => saveFile(new Blob([this.csv()], {type: 'text/csv'}), this.fileName('csv')));
-    this.find('png').addEventListener('click', () => this.picture().toBlob((blob) => saveFile(blob, this.fileName('png'))));
-    this.find('svg').addEventListener('click', () => saveFile(new Blob([this.drawing()], {type: 'image/svg+xml'}), this.fileName('svg')));
+    const clicked = {
+      all: () => this.showWhole(), pin: () => this.setPin(), undo: () => this.undo(), reset: () => this.reset(), in: () => this.zoom(1.6), out: () => this.zoom(1 / 1.6),
+      csv: () => saveFile(new Blob([this.csv()], {type: 'text/csv'}), this.fileName('csv')),
+      png: () => this.picture().toBlob((blob) => saveFile(blob, this.fileName('png'))),
+      svg: () => saveFile(new Blob([this.drawing()], {type: 'image/svg+xml'}), this.fileName('svg')),
+      link: ({target}) => { this.remember(); copyAddress(target); },
+    };
+    for (const [name, act] of Object.entries(clicked)) this.find(name).addEventListener('click', act);
     this.find('more').addEventListener('toggle', () => this.tellCommand());
-    this.find('link').addEventListener('click', (event) => { this.remember(); copyAddress(event.target); });
     this.find('slider').addEventListener('input', (event) => this.seek(Number(event.target.value)));
     const keys = this.data.alone ? document : this.root; // several viewers of a page: the one with the focus
     keys.addEventListener('keydown', (event) => this.pressed(event), {signal: this.removal.signal});
