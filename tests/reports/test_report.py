@@ -341,7 +341,9 @@ def test_a_claim_of_the_overview_shows_its_runs_from_the_side_file_of_its_study(
     chromium.wait_for("document.querySelector('.choosing').dataset.shown === 'whole-study'")
     chromium.wait_for("document.querySelector('.chosen .yv-ready')")
     assert chromium.run("return document.querySelectorAll('*').length") <= 2000
-    links = chromium.run("return [...document.querySelectorAll('table.papers a.verdict')].map((one) => one.hash)")
+    links = chromium.run(
+        "return [...document.querySelectorAll('table.papers a.verdict')].map((one) => one.hash)"
+    )
     assert len(links) == 6
     for link in (links[5], links[4], links[1]):
         wanted = re.findall(r"shown=(\[[\d,]*\])", link)[0]

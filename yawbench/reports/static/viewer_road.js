@@ -201,7 +201,7 @@ class Road {
     if (!this.touched || viewer.state.time >= end) viewer.state.time = start;
     this.touched = true;
     this.playing = true;
-    for (const button of this.buttons) button.textContent = 'Pause';
+    this.offer('Pause');
     let before = null;
     const next = (now) => {
       if (!this.playing) return;
@@ -218,6 +218,8 @@ class Road {
   pause() {
     this.playing = false;
     this.touched = true;
-    for (const button of this.buttons) button.textContent = 'Play';
+    this.offer('Play');
   }
+
+  offer(words) { for (const button of this.buttons) button.textContent = words; }
 }
