@@ -341,6 +341,8 @@ def test_a_claim_of_the_overview_shows_its_runs_from_the_side_file_of_its_study(
     chromium.wait_for("document.querySelector('.choosing').dataset.shown === 'whole-study'")
     chromium.wait_for("document.querySelector('.chosen .yv-ready')")
     assert chromium.run("return document.querySelectorAll('*').length") <= 2000
+    claims = "document.querySelectorAll('ol.plain > li').length"
+    chromium.wait_for(f"{claims} === 2")  # of the shown study alone: those of all would be too many elements
     links = chromium.run(
         "return [...document.querySelectorAll('table.papers a.verdict')].map((one) => one.hash)"
     )

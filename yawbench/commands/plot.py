@@ -206,7 +206,9 @@ def plot(
         return
     runs = [
         LabelledRun(name, results)
-        for name, results in zip(labels, read_runs(folders, start, thin=minus is window is None), strict=True)
+        for name, results in zip(
+            labels, read_runs(folders, start, thin=minus is None and window is None), strict=True
+        )
     ]
     if minus is not None:
         runs = differences(runs, runs[_place(minus, labels, folders)])

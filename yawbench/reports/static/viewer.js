@@ -384,7 +384,7 @@ class Viewer extends InAddress {
     const names = found.slice(0, NAMED).map(({name}) => name).join(', ') + (found.length > NAMED ? ` and ${found.length - NAMED} more` : '');
     if (sure && found.length) throw new Error(`${text} may be ${names}`);
     const where = partial ? '; yawbench plot --page shows all that was recorded' : '';
-    throw new Error(`${partial ? 'this page has' : 'the runs have'} no signal ${text}${names ? `; near are ${names}` : ''}${where}`);
+    throw new Error(`${partial ? `this page has no signal ${text}` : `no signal ${text} was recorded`}${names ? `; near are ${names}` : ''}${where}`);
   }
 
   known(spec) { return spec.split(',').every((name) => partsOf(name.trim()).every((part) => part in this.data.signals)); }
