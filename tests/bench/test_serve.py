@@ -51,7 +51,8 @@ def folder(tmp_path_factory) -> Path:
         run, peaks = whole_car(gain), {}
         for end, of in (("smallest", np.min), ("largest", np.max)):
             peaks[end] = {"plant.sideslip": float(of(run["plant.sideslip"]))}
-        write(noted(run, units=run.units, **peaks), place / "runs" / name)
+        title = f"friction = {0.3 if gain == 1.0 else 0.35}"
+        write(noted(run, units=run.units, title=title, **peaks), place / "runs" / name)
     (place / "runs/both.html").write_text(page(labelled(whole_car(), whole_car(2.0))), "utf-8")
     (place / "link.html").symlink_to(outside / "secret.txt")
     (place / "out").symlink_to(outside, target_is_directory=True)
@@ -222,12 +223,19 @@ def test_runs_are_found_by_what_was_changed_sorted_and_folded(server, chromium: 
     assert chromium.run(names) == ["runs/one", "runs/two"]
     chromium.run(press)
     assert chromium.run(names) == ["runs/two", "runs/one"]
-    chromium.run(
-        "const field = document.querySelector('.filter'); field.value = 'RUNS/two';"
-        "field.dispatchEvent(new Event('input'))"
-    )
-    assert chromium.run(names) == ["runs/two"]
-    assert chromium.run("return document.querySelector('.found').textContent") == "1 of 2"
+    for text, found in (
+        ("RUNS/two", ["two"]),
+        ("friction=0.3", ["one"]),
+        ("friction = 0.35", ["two"]),
+        ("0.", ["two", "one"]),
+    ):
+        chromium.run(
+            "const field = document.querySelector('.filter'); field.value = arguments[0];"
+            "field.dispatchEvent(new Event('input'))",
+            text,
+        )
+        assert chromium.run(names) == [f"runs/{name}" for name in found]
+        assert chromium.run("return document.querySelector('.found').textContent") == f"{len(found)} of 2"
     assert chromium.console() == []
 
 

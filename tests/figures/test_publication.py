@@ -9,12 +9,14 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import matplotlib
+import numpy as np
 import pytest
 from PIL import Image
 
 from tests.command_line import status_of
 from tests.orchestrator.recorded import car, write
 from tests.refusals import each_mentions
+from yawbench.figures import plots
 from yawbench.figures.display import LabelledRun
 from yawbench.figures.plots import draw
 from yawbench.figures.style import LINES, STYLES
@@ -74,6 +76,41 @@ def test_a_size_that_is_none_is_refused(run, capsys):
     )
 
 
+def test_differences_and_time_spans_are_drawn_by_their_options(run, monkeypatch):
+    write(car(2.0), Path("other"))
+    drawn = []
+    monkeypatch.setattr(plots, "draw", lambda *given: drawn.append(draw(*given)) or drawn[-1])
+    both = ("plot", run, "other", "--label", "one", "--label", "two", *SINGLE, "--out", "fig.svg")
+    for named in ("one", run, f"./{run}/"):
+        assert status_of(*both, "--minus", named) == 0
+    assert status_of(*both, "--minus", "two", "--during", "1 to 2.5 s") == 0
+    (apart,) = drawn[0].axes[0].get_lines()
+    wanted = np.degrees(car(2.0)["plant.yaw_rate"] - car()["plant.yaw_rate"])
+    assert np.asarray(apart.get_ydata()) == pytest.approx(wanted)
+    assert len({tuple(one.axes[0].get_lines()[0].get_ydata()) for one in drawn[:3]}) == 1
+    (cut,) = drawn[3].axes[0].get_lines()
+    assert (cut.get_xdata()[0], cut.get_xdata()[-1]) == (1.0, 2.5)
+    rows = (car().time >= 1.0) & (car().time <= 2.5)
+    assert np.asarray(cut.get_ydata()) == pytest.approx(-wanted[rows])
+
+
+def test_wrong_baselines_and_time_spans_are_refused(run, capsys):
+    write(car(2.0), Path("other"))
+    calls = {
+        ("--minus", "others"): ("--minus others", "other"),
+        ("--minus", "run", "--page"): ("--minus", "page", "baseline"),
+        ("--minus", "run", "--panel", "path"): ("--minus", "path", "position_y"),
+        ("--during", "soon"): ("--during", "soon", "from 1 s to 3 s"),
+        ("--during", "at 2 s"): ("--during", "at 2 s", "1 to 3 s"),
+        ("--during", "90 to 95 s"): ("run", "nothing", "90", "95 s"),
+        ("--during", "1 to 2 s", "--page"): ("--during", "page"),
+    }
+    for options in calls:
+        assert status_of("plot", run, "other", *SINGLE, *options) == 2, options
+    assert status_of("plot", run, "--minus", "run") == 2
+    assert each_mentions(capsys.readouterr().err, *calls.values(), ("--minus", "two runs"))
+
+
 def test_outputs_that_contradict_each_other_are_refused(run, capsys):
     for options in (
         ("--out", "fig.jpeg"),
@@ -107,6 +144,16 @@ def size_of(file: str) -> tuple[float, float]:
     """Return width and height of an SVG file [pt]."""
     root = ElementTree.parse(file).getroot()
     return float(root.get("width").removesuffix("pt")), float(root.get("height").removesuffix("pt"))
+
+
+def test_a_legend_is_filled_as_lines_of_a_text_are():
+    labels = ["no control", "fuzzy controller on sideslip", "adaptive fuzzy neural network"]
+    with matplotlib.rc_context({**STYLES["ieee"], "figure.figsize": (88 / 25.4, 60 / 25.4)}):
+        figure = draw([LabelledRun(label, car(k + 1.0)) for k, label in enumerate(labels)], ["sideslip"])
+        rows = [[text.get_text() for text in row.get_texts()] for row in figure.legends]
+        boxes = [row.get_window_extent() for row in figure.legends]
+    assert rows == [labels[:2], [labels[2], "reference"]]
+    assert max(box.x1 for box in boxes) <= figure.bbox.x1 and boxes[1].y1 <= boxes[0].y0
 
 
 def test_panels_without_room_are_refused(run, capsys):

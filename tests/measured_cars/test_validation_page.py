@@ -139,6 +139,15 @@ def test_decoded_samples_equal_those_of_the_car(chromium: Browser, made, page):
         assert abs(value - wanted) <= spans[name] / 131068 * (1 + 1e-9), name
 
 
+def test_a_recording_of_another_time_begins_with_the_run_so_that_the_slider_ends_with_the_data(made):
+    _, _, validation = made
+    (plot,) = validation.plots
+    late = replace(plot, tests=[plot.tests[0], replace(plot.tests[1], time=plot.tests[1].time + 749.0)])
+    data = data_in(validation_page(replace(validation, plots=[late])))
+    assert data["offsets"] == {"2": pytest.approx(plot.time[0] - late.tests[1].time[0])}
+    assert data_in(validation_page(validation))["offsets"] == {}
+
+
 @pytest.mark.parametrize(("width", "colours"), looks(PHONE, DESK, narrow=True))
 def test_the_page_has_no_flaws_and_stays_within_its_budget(chromium: Browser, page, width, colours):
     check_whole(chromium, page, width, colours)

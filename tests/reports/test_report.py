@@ -30,6 +30,8 @@ from tests.reports.flaws import (
 from tests.reports.made_up import HALF_A_CAR, data_in, unpacked
 from yawbench.cli import main
 from yawbench.foundation.errors import ScenarioError
+from yawbench.metrics.verdict import Status, worded
+from yawbench.reports.overview_page import held
 from yawbench.reports.page_parts import with_minus
 from yawbench.reports.planes import PLANES
 from yawbench.studies.load_experiment import found_studies, load_experiment
@@ -322,6 +324,13 @@ def test_several_studies_make_one_page_with_an_overview(overview):
     assert len([*(overview.folder / "data").glob("*.js")]) == 3
 
 
+def test_checks_that_were_not_judged_are_not_counted_among_those_that_do_not_hold():
+    one = {status: worded(status, "checks") for status in Status}
+    assert held([one[Status.NOT_JUDGED]] * 2) == "2 not judged"
+    assert held([one[Status.PASSED], one[Status.FAILED], one[Status.NOT_JUDGED]]) == "1 of 2, 1 not judged"
+    assert (held([one[Status.PASSED], one[Status.SENSITIVE]]), held([])) == ("1 of 2", "")
+
+
 @pytest.mark.parametrize(("width", "colours"), looks(PHONE, DESK, narrow=False))
 def test_a_claim_of_the_overview_shows_its_runs_from_the_side_file_of_its_study(
     chromium, overview, width, colours
@@ -332,7 +341,11 @@ def test_a_claim_of_the_overview_shows_its_runs_from_the_side_file_of_its_study(
     chromium.wait_for("document.querySelector('.choosing').dataset.shown === 'whole-study'")
     chromium.wait_for("document.querySelector('.chosen .yv-ready')")
     assert chromium.run("return document.querySelectorAll('*').length") <= 2000
-    links = chromium.run("return [...document.querySelectorAll('ol.plain a')].map((one) => one.hash)")
+    claims = "document.querySelectorAll('ol.plain > li').length"
+    chromium.wait_for(f"{claims} === 2")  # of the shown study alone: those of all would be too many elements
+    links = chromium.run(
+        "return [...document.querySelectorAll('table.papers a.verdict')].map((one) => one.hash)"
+    )
     assert len(links) == 6
     for link in (links[5], links[4], links[1]):
         wanted = re.findall(r"shown=(\[[\d,]*\])", link)[0]
@@ -342,6 +355,9 @@ def test_a_claim_of_the_overview_shows_its_runs_from_the_side_file_of_its_study(
         chromium.wait_for("document.querySelector('.chosen .yv-ready')")
         shown = "JSON.stringify(document.querySelector('.chosen .yv').viewer.state.shown)"
         chromium.wait_for(f"{shown} === '{wanted}'")
+        chromium.wait_for(f"document.querySelectorAll('#{study} ol.plain > li').length === 2")
+        opened = "return [...document.querySelectorAll('section > details[open]')]"
+        assert chromium.run(f"{opened}.map((one) => one.parentElement.id)") == [study]
     assert all(one.startswith("file://") for one in chromium.requests())
     assert [one for one in flaws(chromium) if not one.startswith("fetched")] == []
     assert inaccessible(chromium, colours) == []

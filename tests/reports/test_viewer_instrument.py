@@ -12,15 +12,19 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from tests.orchestrator.recorded import noted
+from tests.command_line import status_of
+from tests.orchestrator.recorded import noted, write
+from tests.refusals import mentions
 from tests.reports.browser import PHONE, Browser
-from tests.reports.made_up import whole_car
+from tests.reports.made_up import data_in, whole_car
 from tests.reports.test_viewer import VIEWER, chart, drag, opened
 from yawbench.events.kinds import events_in
+from yawbench.figures import plots
 from yawbench.figures.panels import LabelledRun
+from yawbench.figures.plots import draw
 from yawbench.orchestrator.results.reader import Results
 from yawbench.reports.planes import PLANES
-from yawbench.reports.viewer import Settings, page
+from yawbench.reports.viewer import LEAST, Settings, page
 from yawbench.reports.viewer_views import Mark, View
 from yawbench.vocabulary.gravity import G
 
@@ -229,32 +233,84 @@ def test_the_picture_as_svg_has_titles_axis_legend_and_a_line_per_run(chromium: 
     assert len(lines) == 2 * len(SHOWN)
 
 
-def test_the_command_draws_what_is_shown(chromium: Browser, tmp_path):
-    run = replace(whole_car(), folder=Path("results/one run"))
-    (file := tmp_path / "one.html").write_text(page([LabelledRun("x", run)]), "utf-8")
-    opened(chromium, file, 'run?panels=["plant.sideslip"]')
-    command = chromium.run(VIEWER + "viewer.tellCommand(); return viewer.find('command').textContent")
-    assert command == "yawbench plot 'results/one run' --panel plant.sideslip --format svg"
+COMMAND = VIEWER + "viewer.tellCommand(); return viewer.find('command').textContent"
 
 
-def test_the_command_of_a_difference_names_its_baseline(chromium: Browser, tmp_path):
-    runs = [LabelledRun(label, replace(whole_car(), folder=Path(f"results/{label}"))) for label in (A, B, C)]
-    (file := tmp_path / "three.html").write_text(page(runs), "utf-8")
-    opened(chromium, file, 'run?panels=["plant.sideslip"]&shown=[2]&baseline=1&difference=true')
-    command = chromium.run(VIEWER + "viewer.tellCommand(); return viewer.find('command').textContent")
-    places = [f"results/{label}" for label in (B, C)]
-    words = [
-        "yawbench",
-        "plot",
-        *places,
-        "--panel",
-        "plant.sideslip",
-        "--minus",
-        places[0],
-        "--format",
-        "svg",
+def saved(folder: Path) -> list[LabelledRun]:
+    """Return three runs that are recorded below a folder, one in a folder whose name has a space."""
+    runs = [
+        LabelledRun(label, replace(whole_car(k + 1.0), folder=folder / f"run {k}"))
+        for k, label in enumerate((A, B, C))
     ]
-    assert shlex.split(command) == words
+    for run in runs:
+        write(run.results, run.results.folder)
+    return runs
+
+
+@pytest.mark.parametrize(
+    ("view", "panels"),
+    [
+        ('panels=["plant.sideslip"]&shown=[2]', {"plant.sideslip": [C]}),
+        ('panels=["plant.sideslip","plant.yaw_rate - reference.yaw_rate_ref"]&span=[0.5,1.25]',
+         {"plant.sideslip": [A, B, C], "plant.yaw_rate - reference.yaw_rate_ref": [A, B, C]}),
+        ('panels=["plant.sideslip"]&shown=[2]&baseline=1&difference=true',
+         {"plant.sideslip": [f"{C} minus {B}"]}),
+        ('panels=["plant.yaw_rate"]&shown=[0,1]&x="plant.sideslip"',
+         {"plant.yaw_rate(plant.sideslip)": [A, B]}),
+    ],
+)  # fmt: skip
+def test_the_command_draws_the_view(chromium: Browser, tmp_path, monkeypatch, view, panels):
+    runs = saved(tmp_path)
+    (file := tmp_path / "three.html").write_text(page(runs), "utf-8")
+    opened(chromium, file, f"run?{view}")
+    shown = chromium.run(
+        VIEWER + "return viewer.panels.map(({meaning: {factor}, drawn}) => drawn.filter(({run, reference}) =>"
+        " viewer.shows(run) && !reference).map(({values}) => { const own = [...values].map((v) => v * factor)"
+        ".filter(Number.isFinite); return [own.at(0), own.at(-1)]; }))"
+    )
+    command = chromium.run(COMMAND)
+    drawn = []
+    monkeypatch.setattr(plots, "draw", lambda *given: drawn.append(draw(*given)) or drawn[0])
+    assert status_of(*shlex.split(command)[1:], "--out", tmp_path / "out") == 0
+    (figure,) = drawn
+    assert [axes.get_label() for axes in figure.axes] == [*panels]
+    labels = [text.get_text() for legend in figure.legends for text in legend.get_texts()]
+    for axes, (name, own), ends in zip(figure.axes, panels.items(), shown, strict=True):
+        lines = [
+            line for line in axes.get_lines() if line.get_label() != "reference" and len(line.get_xdata()) > 1
+        ]
+        assert len(lines) == len(own) and [label for label in labels if label != "reference"] in (own, [])
+        for line, (first, last) in zip(lines, ends, strict=True):
+            x, y = (np.asarray(values, float) for values in line.get_data())
+            if "span" in view:
+                assert (x[0], x[-1]) == pytest.approx((0.5, 1.25), abs=0.01)
+            else:
+                y = y[np.isfinite(y)]
+                assert (y[0], y[-1]) == pytest.approx((first, last), rel=1e-3, abs=1e-4), name
+
+
+def test_a_view_that_figures_have_not_has_no_command(chromium: Browser, tmp_path):
+    (file := tmp_path / "three.html").write_text(page(saved(tmp_path)), "utf-8")
+    for view in ('x="distance"', 'x="plant.sideslip"&difference=true'):
+        opened(chromium, file, f"run?{view}")
+        assert chromium.run(COMMAND) == "", view
+
+
+def test_a_judged_signal_that_the_page_does_not_carry_is_named_with_the_command_that_shows_it(
+    chromium: Browser, tmp_path
+):
+    runs, lost = saved(tmp_path), "plant.acceleration_y"
+    (file := tmp_path / "three.html").write_text(
+        page(runs, Settings([View(panels=["sideslip"])], largest=LEAST))
+    )
+    opened(chromium, file, f'run?shown=[1]&lit=["{lost}",2.5,"peak ≤ 2.5 m/s²"]')
+    told = "document.querySelector('.yv-missing')"
+    assert mentions(chromium.run(f"return {told}.textContent"), lost, "peak ≤ 2.5 m/s²")
+    command = shlex.split(chromium.run(f"return {told}.querySelector('code').textContent"))
+    assert status_of(*command[1:], "--out", tmp_path / "found.html") == 0
+    assert data_in((tmp_path / "found.html").read_text("utf-8"))["views"][0]["panels"] == [lost]
+    opened(chromium, file, 'run?lit=["plant.sideslip",null,"peak"]')
+    assert chromium.run(f"return {told}.hidden")
 
 
 def test_phase_planes_have_their_limits(chromium: Browser, tmp_path):

@@ -42,7 +42,7 @@ from yawbench.foundation.errors import ResultsError, YawbenchError
 from yawbench.foundation.messages import printable
 from yawbench.foundation.safe_files import NO_FOLLOW
 from yawbench.metrics.measures import words
-from yawbench.metrics.verdict import Status, VerdictText
+from yawbench.metrics.verdict import Status, VerdictText, worded
 from yawbench.orchestrator.results.file_formats import FILES
 from yawbench.orchestrator.results.reader import FoundRun, found_runs, load_results
 from yawbench.orchestrator.results.run_record import RUN_FILE, RunRecord
@@ -169,31 +169,19 @@ PEAKS = {"sideslip": "rad", "yaw_rate": "rad/s", "acceleration_y": "m/s2"}
 def listed_run(path: str, run: FoundRun) -> ListedRun:
     """Return a run as the table shows it, by its record alone: no signals are read."""
     record = run.record
-    verdict: VerdictText | str = ""
     reasons = why(record.events)
-    if "events" in record.model_fields_set:
-        verdict = LOST if reasons else HELD
+    status = Status.FAILED if reasons else Status.PASSED
     return ListedRun(
         path=path,
         name=path.rpartition("/")[2],
         title=with_changes(record.title or path, record.overrides),
         changed=changed(record.overrides) if record.overrides else "",
         peaks=[_peak(record, signal, unit) for signal, unit in PEAKS.items()],
-        verdict=verdict,
+        verdict=worded(status, "cars") if "events" in record.model_fields_set else "",
         why="; ".join(map(str, reasons)),
         status=run.status.value,
         started=(record.started or "–")[:16].replace("T", " "),
     )
-
-
-def _verdict(status: Status, words: str) -> VerdictText:
-    text = VerdictText(words)
-    text.status = status
-    return text
-
-
-HELD, LOST = _verdict(Status.PASSED, "held"), _verdict(Status.FAILED, "lost")
-"""Whether the car of a run was lost."""
 
 
 def _peak(record: RunRecord, signal: str, unit: str) -> tuple[str, float] | None:

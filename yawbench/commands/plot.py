@@ -34,7 +34,8 @@ Panels = Annotated[
         metavar="NAME",
         autocompletion=completing_names("signals"),
         help="A signal (yaw_rate, plant.roll_angle, wheel_torque_*), its error (sideslip_error), one over "
-        "another (yaw_rate(sideslip)) or path; repeatable. Default: the figures of the papers.",
+        "another (yaw_rate(sideslip)), a difference or sum ('yaw_rate - yaw_rate_ref') or path; repeatable. "
+        "Default: the figures of the papers.",
     ),
 ]
 Minus = Annotated[
@@ -44,6 +45,10 @@ Minus = Annotated[
         metavar="RUN",
         help="Draw the differences of the other runs from this one, a label or a folder of RESULTS.",
     ),
+]
+During = Annotated[
+    str | None,
+    typer.Option("--during", metavar="SPAN", help="Draw a time span alone, such as '1 to 3 s'."),
 ]
 AsPage = Annotated[bool, typer.Option("--page", help="Write view.html, an interactive page, instead.")]
 FileFormat = Annotated[
@@ -103,6 +108,23 @@ def _place(run: str, labels: Sequence[str], folders: Sequence[Path]) -> int:
     return names.index(wanted) % len(labels)
 
 
+def _window(text: str) -> tuple[float, float]:
+    """Return the time span [s] that `--during` gives.
+
+    Raises:
+        ScenarioError: it is none.
+    """
+    from yawbench.metrics.expressions import window_of
+
+    try:
+        begin, end = window_of(text)
+        if begin == end:
+            raise ValueError(f"{text} is an instant: write a span, such as 1 to 3 s")
+    except ValueError as error:
+        raise ScenarioError(f"--during: {error}", code="option-invalid") from None
+    return begin, end
+
+
 def _check_output(out: Path | None, page: bool, format: str | None, published: bool) -> None:
     """Check that the file, its format and the kind of output agree; `published`: with a style or a size.
 
@@ -135,6 +157,7 @@ def plot(
     label: Labels = None,
     panel: Panels = None,
     minus: Minus = None,
+    during: During = None,
     measured: MeasuredRuns = None,
     begin: MeasuredFrom = "0 s",
     page: AsPage = False,
@@ -145,17 +168,17 @@ def plot(
     """Draw one run, or several overlaid.
 
     Figures are written as SVG and PNG; --format, or a file such as --out fig.pdf, chooses one format.
-    With --minus RUN, the other runs' differences from that run are drawn. With --style or --size, they
-    are made for a publication: no title, no note, fonts embedded. With --page, an interactive page is
-    written instead. A scenario is run first if its results (those of `yawbench run` without --out) are
-    missing or out of date. Without --out, the figure of one run goes into its folder, that of several
-    into their common parent folder.
+    With --minus RUN, the other runs' differences from that run are drawn, with --during a time span. With
+    --style or --size, they are made for a publication: no title, no note, fonts embedded. With --page, an
+    interactive page is written instead. A scenario is run first if its results (those of `yawbench run`
+    without --out) are missing or out of date. Without --out, the figure of one run goes into its folder,
+    that of several into their common parent folder.
     """
     import matplotlib
 
     from yawbench.figures.display import LabelledRun
     from yawbench.figures.panels import check_panels
-    from yawbench.figures.plots import draw, overview_of, shown_by, size_of_style
+    from yawbench.figures.plots import draw, overview_of, shown_by, size_of_style, within
     from yawbench.figures.plots import minus as differences
     from yawbench.figures.style import KINDS, save
     from yawbench.studies.comparison import FIGURES
@@ -165,6 +188,11 @@ def plot(
             "--minus is of figures; on a page, mark the baseline, and 'minus the baseline'",
             code="option-invalid",
         )
+    if page and during is not None:
+        raise ScenarioError(
+            "--during is of figures; on a page, drag over the time span", code="option-invalid"
+        )
+    window = _window(during) if during is not None else None
     settings = _settings(style, size)
     _check_output(options.out, page, format, bool(settings))
     file = options.out if options.out and options.out.suffix[1:] in KINDS and not page else None
@@ -178,13 +206,17 @@ def plot(
         return
     runs = [
         LabelledRun(name, results)
-        for name, results in zip(labels, read_runs(folders, start, thin=minus is None), strict=True)
+        for name, results in zip(
+            labels, read_runs(folders, start, thin=minus is None and window is None), strict=True
+        )
     ]
     if minus is not None:
         runs = differences(runs, runs[_place(minus, labels, folders)])
         if "path" in (panel or ()):
             raise ScenarioError("--minus: the path is no signal; position_y is one", code="option-invalid")
         panel = panel or [name for name in overview_of(runs) if name != "path"]
+    if window:
+        runs = within(runs, window)
     check_panels(runs, panel or ())
     figures: dict[str, Sequence[str]] = {"overview": panel or overview_of(runs)}
     if file:

@@ -1,9 +1,9 @@
 """Panels of figures: what one pair of axes shows, of one run or of several overlaid.
 
 The name of a panel selects what it shows: a signal (over its reference, where the run recorded one),
-`<signal>_error`, `path`, one signal over another (`yaw_rate(sideslip)`), or a signal of four wheels
-(`wheel_torque_*`: one panel with four lines for one run, four panels for several). Panels whose signals no
-run has are omitted.
+`<signal>_error`, `path`, one signal over another (`yaw_rate(sideslip)`), a sum or difference
+(`yaw_rate - yaw_rate_ref`), or a signal of four wheels (`wheel_torque_*`: one panel with four lines for one
+run, four panels for several). Panels whose signals no run has are omitted.
 
 A line that goes much further than the others may leave the axes; a note then gives how far it goes. Lines of
 sideslip and slip angles have a gap while the car stands.
@@ -11,6 +11,7 @@ sideslip and slip angles have a gap while the car stands.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -29,7 +30,7 @@ from yawbench.vocabulary.wheels import WHEEL_NAMES, wheels
 
 from .display import LabelledRun, digits_of, in_formula, shown_unit, unit_of_signal
 from .phase_portrait import curves_of, draw_portrait, signals_of, spread_rows
-from .style import ROW, WIDTH, line_style, literal, note_above, reference_style, style_of_run
+from .style import ROW, WIDTH, line_style, literal, note_beyond, reference_style, style_of_run
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -87,6 +88,10 @@ def panels_of(runs: Sequence[LabelledRun], name: str, *, whole: bool = False) ->
         if not curves_of(runs, *signals):
             return []
         return [Panel(name, False, lambda axes: draw_portrait(axes, runs, *signals), over_time=False, rows=2)]
+    if len(terms := re.split(r" ([-+]) ", name)) > 1:
+        if all(_total(run.results, terms) is None for run in runs):
+            return []
+        return [Panel(name, False, lambda axes: _draw_total(axes, runs, terms))]
     if name.endswith("_error"):
         signal = name.removesuffix("_error")
         if all(_error(run, signal) is None for run in runs):
@@ -168,8 +173,7 @@ def _limit(axes: Axes, scale: float, lines: list[tuple[str, float]], unit: str) 
     largest = 1.5 * factor * max(scale, *(peak for _, peak in lines if peak <= OFF_SCALE * scale))
     axes.set_ylim(-largest, largest)
     room = "\N{NO-BREAK SPACE}"  # a unit stays with its number
-    note = "; ".join(f"{label}, up to {digits_of(peak * factor)}{room}{text}" for label, peak in lost)
-    note_above(axes, f"beyond the axes: {note}")
+    note_beyond(axes, ((label, f"{digits_of(peak * factor)}{room}{text}") for label, peak in lost))
 
 
 def _draw_error(axes: Axes, runs: Sequence[LabelledRun], signal: str, whole: bool) -> None:
@@ -194,6 +198,31 @@ def _error(run: LabelledRun, signal: str) -> np.ndarray | None:
     wanted = run.results[reference]
     error: np.ndarray = (run.results[columns[0]] - wanted) / _peak(wanted)
     return error
+
+
+def _total(results: Results, terms: Sequence[str]) -> tuple[np.ndarray, str] | None:
+    """Return values and unit of `a + b - c`, from its signals and signs; None if one was not recorded."""
+    columns = [columns_of(results, name)[:1] for name in terms[::2]]
+    if not all(columns):
+        return None
+    first, *others = (results[column] for (column,) in columns)
+    for sign, values in zip(terms[1::2], others, strict=True):
+        first = first + values if sign == "+" else first - values
+    return first, unit_of_signal(results.units[columns[0][0]])
+
+
+def _draw_total(axes: Axes, runs: Sequence[LabelledRun], terms: Sequence[str]) -> None:
+    """Draw a sum or difference of signals."""
+    unit = ""
+    for number, run in enumerate(runs):
+        if total := _total(run.results, terms):
+            values, unit = total
+            _line(axes, run.results.time, values, unit, style_of_run(number, run.results))
+    signs = ({"+": "plus", "-": "minus"}[sign] for sign in terms[1::2])
+    others = (words(variable_of(name)).lower() for name in terms[2::2])
+    _finish(
+        axes, terms[0], unit, "".join(f" {sign} {name}" for sign, name in zip(signs, others, strict=True))
+    )
 
 
 def _draw_wheels(axes: Axes, run: LabelledRun, name: str) -> None:

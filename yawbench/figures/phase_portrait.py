@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -20,7 +19,7 @@ from yawbench.orchestrator.signal_names import VARIABLE
 from yawbench.vehicles.motion import largest
 
 from .display import LabelledRun, digits_of, in_formula, shown_unit, unit_of_signal
-from .style import line_style, literal, note_above, reference_style
+from .style import line_style, literal, note_beyond, reference_style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -34,8 +33,7 @@ MARGIN = 1.2
 """Limits of the axes over the extent of the curves within them."""
 
 
-@dataclass(frozen=True)
-class PortraitCurve:
+class PortraitCurve(NamedTuple):
     """A run's y over x in displayed units, and its references if it has both."""
 
     number: int
@@ -58,10 +56,8 @@ def curves_of(runs: Sequence[LabelledRun], x: str, y: str) -> list[PortraitCurve
         across, up = columns_of(results, x), columns_of(results, y)
         if not across or not up:
             continue
-        wanted = reference_of(results, across[0]), reference_of(results, up[0])
-        reference = None
-        if wanted[0] and wanted[1]:
-            reference = _shown(results, wanted[0]), _shown(results, wanted[1])
+        x_ref, y_ref = reference_of(results, across[0]), reference_of(results, up[0])
+        reference = (_shown(results, x_ref), _shown(results, y_ref)) if x_ref and y_ref else None
         curves.append(
             PortraitCurve(number, label, _shown(results, across[0]), _shown(results, up[0]), reference)
         )
@@ -133,9 +129,8 @@ def _limit_portrait(
     )
     axes.set_xlim(-limits[0], limits[0])
     axes.set_ylim(-limits[1], limits[1])
-    gone = [
-        f"{curve.label}, up to {digits_of(far[0])} {units[0]} and {digits_of(far[1])} {units[1]}"
+    note_beyond(axes, (
+        (curve.label, f"{digits_of(far[0])} {units[0]} and {digits_of(far[1])} {units[1]}")
         for curve, far, near in zip(curves, reach, stay, strict=True)
         if not near
-    ]
-    note_above(axes, f"beyond the axes: {'; '.join(gone)}")
+    ))  # fmt: skip

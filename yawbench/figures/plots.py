@@ -8,7 +8,7 @@ behind the lines.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -16,7 +16,8 @@ import numpy as np
 
 from yawbench.foundation.errors import ResultsError
 from yawbench.foundation.messages import fold
-from yawbench.metrics.expressions import reference_of
+from yawbench.metrics.expressions import TimeWindow, reference_of
+from yawbench.metrics.expressions import during as said_during
 from yawbench.orchestrator.plan import Override
 from yawbench.orchestrator.recordings.gaps import gaps_noted
 from yawbench.orchestrator.results.run_record import RunStatus
@@ -109,19 +110,7 @@ def in_legend(spans: Sequence[FaultSpan]) -> list[str]:
 
 def shown_by(runs: Sequence[LabelledRun], names: Sequence[str], *, whole: bool = False) -> list[Panel]:
     """Return the panels that the names select, in order (see `panels_of`)."""
-    panels = [panel for name in names for panel in panels_of(runs, name, whole=whole)]
-    spans = spans_of(runs)
-    if not spans:
-        return panels
-    return [replace(panel, draw=_marked(panel.draw, spans)) if panel.over_time else panel for panel in panels]
-
-
-def _marked(draw: Callable[[Axes], None], spans: Sequence[FaultSpan]) -> Callable[[Axes], None]:
-    def fill(axes: Axes) -> None:
-        draw(axes)
-        mark(axes, spans)
-
-    return fill
+    return [panel for name in names for panel in panels_of(runs, name, whole=whole)]
 
 
 def draw(
@@ -155,7 +144,7 @@ def draw(
         raise ResultsError(
             f"{where}: nothing to draw, no run recorded any of {', '.join(panels)}.", code="nothing-to-draw"
         )
-    size = own_size()
+    size, spans = own_size(), spans_of(runs)
     rows = rows_of(selected, size[0] if size else WIDTH)
     with new_figure() as figure:
         heights = [max(panel.rows for panel in row) for row in rows]
@@ -170,6 +159,8 @@ def draw(
                 elif panel.scale:
                     first[panel.scale] = axes
                 panel.draw(axes)
+                if panel.over_time and spans:
+                    mark(axes, spans)
                 below = rows[i + 1] if i + 1 < len(rows) else []
                 if panel.over_time and below and below[0].over_time:
                     axes.set_xlabel("")  # the panel below has the same time axis
@@ -203,6 +194,24 @@ def minus(runs: Sequence[LabelledRun], baseline: LabelledRun) -> list[LabelledRu
         }
         difference = Difference(results.folder, results.time, columns, results.units, results.record)
         found.append(LabelledRun(f"{label} minus {baseline.label}", difference))
+    return found
+
+
+def within(runs: Sequence[LabelledRun], window: TimeWindow) -> list[LabelledRun]:
+    """Return the rows of runs within a time span [s].
+
+    Raises:
+        ResultsError: a run has fewer than two there.
+    """
+    found = []
+    for label, results in runs:
+        rows = (results.time >= window[0]) & (results.time <= window[1])
+        if np.count_nonzero(rows) < 2:
+            raise ResultsError(
+                f"{results.where}: nothing to draw{said_during(window)}", code="nothing-to-draw"
+            )
+        columns = {name: values[rows] for name, values in results.columns.items()}
+        found.append(LabelledRun(label, replace(results, time=results.time[rows], columns=columns)))
     return found
 
 

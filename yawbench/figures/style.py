@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.legend import Legend
     from matplotlib.lines import Line2D
 
 
@@ -262,8 +263,9 @@ def _characters(axes: Axes) -> int:
     return int(wide * 72 / (CHARACTER * rcParams["font.size"]))
 
 
-def note_above(axes: Axes, note: str) -> None:
-    """Write a note between a panel and its title."""
+def note_beyond(axes: Axes, lines: Iterable[tuple[str, str]]) -> None:
+    """Write between a panel and its title which lines (label, how far they go) leave the axes."""
+    note = f"beyond the axes: {'; '.join(f'{label}, up to {far}' for label, far in lines)}"
     rows = textwrap.wrap(literal(note), _characters(axes) if own_size() else NOTE_WIDTH)
     axes.set_title(axes.get_title(loc="left"), pad=6 + 10 * len(rows))
     axes.annotate(
@@ -331,14 +333,25 @@ def _frame_bare(figure: Figure, size: tuple[float, float], handles: Sequence[Art
     most = int((size[0] / line - 4) / CHARACTER)  # characters beside a handle
     for handle in handles:
         handle.set_label("\n".join(textwrap.wrap(literal(str(handle.get_label())), most)))
-    for columns in range(len(handles), 0, -1):
-        legend = figure.legend(
-            handles=handles, loc="upper left", bbox_to_anchor=(0.0, 1.0), ncols=columns,
-            borderaxespad=0.2, borderpad=0.0, columnspacing=1.0, handlelength=2.2, labelspacing=0.3,
+
+    def place(row: Sequence[Artist], down: float) -> Legend:
+        return figure.legend(
+            handles=row, loc="upper left", bbox_to_anchor=(0.0, 1 - down), ncols=len(row),
+            borderaxespad=0.2, borderpad=0.0, columnspacing=1.0, handlelength=2.2,
         )  # fmt: skip
-        box = legend.get_window_extent()
-        if columns == 1 or box.width <= 0.98 * figure.bbox.width:
-            head = box.height / figure.bbox.height + 0.6 * line / size[1]
-            figure.get_layout_engine().set(rect=(0, 0, 1, 1 - head))  # type: ignore[union-attr, call-arg]
-            break
-        legend.remove()
+
+    rows: list[
+        list[Artist]
+    ] = []  # of the legend, filled as lines of a text are: columns would make more of them
+    for handle in handles:
+        trial = place([*(rows[-1] if rows else []), handle], 0.0)
+        if rows and trial.get_window_extent().width <= 0.98 * figure.bbox.width:
+            rows[-1].append(handle)
+        else:
+            rows.append([handle])
+        trial.remove()
+    head = 0.0  # of the figure's height
+    for row in rows:
+        head += (place(row, head).get_window_extent().height / figure.dpi + 0.3 * line) / size[1]
+    if rows:
+        figure.get_layout_engine().set(rect=(0, 0, 1, 1 - head - 0.3 * line / size[1]))  # type: ignore[union-attr, call-arg]

@@ -85,20 +85,23 @@ DISTANCE = "distance"
 def _cross_plots(validation: Validation) -> tuple[list[LabelledRun], Settings]:
     """Return band, run and tests of all cross plots as runs of a viewer, with a view of each plot."""
     runs: list[LabelledRun] = []
-    views, bands = [], []
+    views, bands, offsets = [], [], {}
     over = f"plant.{validation.horizontal}"
     for plot in validation.plots:
         signal, distance = f"plant.{plot.signal}", f"{plot.signal}.{DISTANCE}"
         first = len(runs)
         columns = {over: plot.over, signal: plot.values}
         runs.append(LabelledRun(validation.title, drawn(Results, plot.time, columns)))
+        begin, end = plot.time[0], plot.time[-1]
         for test in plot.tests:
+            if test.time[0] > end or test.time[-1] < begin:  # the cursor would never be in both
+                offsets[len(runs)] = round(float(begin - test.time[0]), 3)
             columns = {over: test.over, signal: test.values, distance: test.distance}
             runs.append(LabelledRun(test.name, drawn(MeasuredResults, test.time, columns)))
         x, y = plot.outline
         band = {over: x, signal: y}
         bands.append(len(runs))
-        times = np.linspace(plot.time[0], plot.time[-1], x.size)  # it has none: those of the run
+        times = np.linspace(begin, end, x.size)  # it has none: those of the run
         runs.append(LabelledRun("tolerance", drawn(Results, times, band)))
         title = f"{words(plot.signal)} over {words(validation.horizontal).lower()}"
         views.append(View(title, [signal, distance], range(first, len(runs)), over))
@@ -106,4 +109,4 @@ def _cross_plots(validation: Validation) -> tuple[list[LabelledRun], Settings]:
             View(f"{words(plot.signal)} over time", [signal, over, distance], range(first, len(runs) - 1))
         )
     limits = [Bound(f"{plot.signal}.{DISTANCE}", 1.0, "tolerance") for plot in validation.plots]
-    return runs, Settings(views, metrics=(), limits=limits, bands=bands, largest=LARGEST)
+    return runs, Settings(views, metrics=(), limits=limits, bands=bands, offsets=offsets, largest=LARGEST)

@@ -51,13 +51,16 @@ class Status(str, Enum):
     NOT_JUDGED = "not judged"
 
 
-Judged = Literal["claims", "checks", "criteria"]
-"""What is judged: claims of a paper, our own checks, or criteria of tests, validations and limits."""
+Judged = Literal["claims", "checks", "criteria", "cars"]
+"""What is judged: claims of a paper, our own checks, criteria of tests, validations and limits, or of cars
+whether they were lost."""
 _WORDS = {
     ("claims", Status.PASSED): "holds",
     ("claims", Status.FAILED): "does not reproduce",
     ("checks", Status.PASSED): "holds",
     ("checks", Status.FAILED): "does not hold",
+    ("cars", Status.PASSED): "held",
+    ("cars", Status.FAILED): "lost",
 }
 """Words other than the status's own."""
 

@@ -6,24 +6,18 @@ A click on a claim loads its runs from a side file.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from markupsafe import Markup
 
 from yawbench.foundation.messages import counted
-from yawbench.metrics.verdict import VerdictText
+from yawbench.metrics.verdict import Status, VerdictText
 
 from .page_parts import SIGNS, Page, render
 from .study_page import VIEW, StudyPage, in_sentence
-from .viewer import (
-    DATA,
-    assets,
-    embedded,
-    tidy_sides,
-    write_side,
-)
+from .viewer import DATA, assets, embedded, tidy_sides, write_side
 
 OVERVIEW = "Yaw-stability control: what papers say, and what comes out"
 """Title of the overview."""
@@ -36,6 +30,7 @@ class OverviewPage(Page):
     template = "overview.html.j2"
     chapters: Sequence[tuple[StudyPage, str]]  # the experiments, each with the address of its page
     verdicts: Sequence[VerdictText]  # of claims, good ones first: a column of the table each
+    checks: Sequence[str]  # how many of each experiment's checks hold
     answer: str  # how many claims hold, in a sentence
     ranking: str  # address of the ranking's page; "": there is none
     folder: str  # of the side files
@@ -65,6 +60,14 @@ def _verdicts_of_all(chapters: Sequence[StudyPage]) -> list[VerdictText]:
     return sorted(found, key=lambda words: [*SIGNS].index(words.status))
 
 
+def held(verdicts: Iterable[VerdictText]) -> str:
+    """Return how many checks hold of those that are judged, and how many are not; "" without checks."""
+    counts = Counter(words.status for words in verdicts)
+    missing = counts.pop(Status.NOT_JUDGED, 0)
+    parts = [f"{counts[Status.PASSED]} of {counts.total()}"] if counts else []
+    return ", ".join([*parts, *([f"{missing} not judged"] if missing else [])])
+
+
 def overview_page(
     chapters: Sequence[StudyPage], pages: Sequence[str], folder: Path, ranking: str = ""
 ) -> str:
@@ -83,6 +86,7 @@ def overview_page(
     view = OverviewPage(
         title=OVERVIEW, chapters=[*zip(chapters, pages, strict=True)], ranking=ranking,
         verdicts=_verdicts_of_all(chapters), answer=_answer_of_all(chapters),
+        checks=[held(row.verdict for row in study.checks) for study in chapters],
         folder=DATA, first=next(iter(shown), ""), frame=embedded(None, VIEW),
         assets=assets("chooser.js"),
     )  # fmt: skip

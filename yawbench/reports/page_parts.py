@@ -18,16 +18,14 @@ from datetime import datetime, timezone
 from importlib.metadata import distribution
 from importlib.resources import files
 from pathlib import Path
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from yawbench.foundation.messages import printable
 from yawbench.metrics.verdict import Status, VerdictText
-from yawbench.orchestrator.plan import (
-    Override,
-)
+from yawbench.orchestrator.plan import Override
 from yawbench.orchestrator.results.record_of_plan import versions
 from yawbench.studies.tables import Table
 
@@ -37,8 +35,7 @@ RANKING = Path("results/proving_ground/ranking", PAGE)
 """Default path of the ranking's page."""
 
 
-@dataclass(frozen=True)
-class FigureImage:
+class FigureImage(NamedTuple):
     """A whole figure: its title, and its image as SVG."""
 
     title: str

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -25,42 +25,27 @@ from yawbench.orchestrator.plan import (
     Plan,
     ValueSource,
 )
-from yawbench.orchestrator.results.reader import Results
-from yawbench.orchestrator.results.record_of_plan import versions
 from yawbench.orchestrator.results.run_record import NOT_RECORDED, RunRecord
 from yawbench.studies.tables import Table
 from yawbench.vocabulary.wheels import WHEEL_NAMES, WHEELS
 
 
-def fmus_of(runs: Iterable[Results | Plan]) -> Table:
-    """Return the table of all FMUs in the runs, taken from their records or plans."""
+def fmus_of(runs: Iterable[RunRecord]) -> Table:
+    """Return the table of all FMUs in the runs."""
     by_fmu: dict[tuple[str, str], dict[str, None]] = {}
     for run in runs:
-        for instance, name, sha256 in _fmus_in(run):
-            by_fmu.setdefault((name, sha256), {})[instance] = None
+        for instance, fmu in run.fmus.items():
+            by_fmu.setdefault((fmu.name or instance, fmu.sha256), {})[instance] = None
     ordered = sorted(by_fmu.items(), key=lambda item: (min(item[1]), item[0][0]))
     rows = [(name, ", ".join(instances), sha256) for (name, sha256), instances in ordered]
     return Table("", ["FMU", "as", "SHA-256"], [*rows])
 
 
-def _fmus_in(run: Results | Plan) -> Iterator[tuple[str, str, str]]:
-    """Yield instance, FMU and its hash."""
-    if isinstance(run, Plan):
-        yield from ((instance.name, instance.fmu.name, instance.fmu.sha256) for instance in run.instances)
-    else:
-        for instance, fmu in run.record.fmus.items():
-            yield instance, fmu.name or instance, fmu.sha256
-
-
-def programs_of(runs: Iterable[Results | Plan]) -> dict[str, str]:
-    """Return the versions of the programs that made the runs, taken from their records.
-
-    Runs without a record, known by their key in the journal, have today's versions: the key includes them.
-    """
+def programs_of(runs: Iterable[RunRecord]) -> dict[str, str]:
+    """Return the versions of the programs that made the runs."""
     by_program: dict[str, dict[str, None]] = {}
     for run in runs:
-        known = versions() if isinstance(run, Plan) else run.record.versions
-        for name, version in known.items():
+        for name, version in run.versions.items():
             by_program.setdefault(name, {})[str(version)] = None
     return {name: " and ".join(several) for name, several in by_program.items()}
 

@@ -31,6 +31,7 @@ from yawbench.orchestrator.results.run_record import RunRecord, RunStatus
 from yawbench.orchestrator.scenario.loader import LoadedScenario
 from yawbench.orchestrator.scenario.overrides import changed
 from yawbench.planner import Planner
+from yawbench.studies.claim_schema import Claim
 from yawbench.studies.claims import ClaimResult, Comparison, OpenValueScan
 from yawbench.studies.confidence import CONFIDENCE
 from yawbench.studies.experiment import FIGURES
@@ -71,16 +72,12 @@ class JudgedClaim:
     """A claim or check with its measured values, verdict and margin.
 
     Attributes:
-        says, source, note: of the file.
         verdict, margin: in words.
         agreeing: share [%] of the region's points with the same verdict; None: not judged over a region.
     """
 
-    says: str
-    source: str
-    note: str
+    claim: Claim
     measured: Sequence[str]  # the values
-    conditions: Sequence[str]  # of which all must be met
     verdict: VerdictText
     margin: str | None
     region: Sequence[str]  # how robust the verdict is, a line each
@@ -280,11 +277,14 @@ ON_SIGNAL = ("peak", "peak_error", "final", "value")
 """Measures whose value is one of their signal."""
 
 
-def runs_made(findings: ExperimentResult) -> Sequence[tuple[Results | Plan, int]]:
-    """Return the results of all runs; along axes, a plan of each kind that was made; with their numbers."""
+def runs_made(findings: ExperimentResult) -> list[tuple[RunRecord, int]]:
+    """Return the records of all runs; along axes, one of each kind that was made; with their numbers.
+
+    Runs along axes, known by their key in the journal, have today's versions: the key includes them.
+    """
     if not findings.spec.axes or findings.planned is None:
-        return [(results, 1) for results in findings.results.values()]
-    return findings.kinds_made
+        return [(results.record, 1) for results in findings.results.values()]
+    return [(record_to_be(plan), number) for plan, number in findings.kinds_made]
 
 
 def repeats(findings: ExperimentResult) -> str:
@@ -305,7 +305,12 @@ def record_of(job: Job, plan: Plan) -> RunRecord:
     try:
         return load_record(job.out)
     except ResultsError:
-        return run_record(plan, status=RunStatus.UNKNOWN, started=datetime.now(timezone.utc))
+        return record_to_be(plan)
+
+
+def record_to_be(plan: Plan) -> RunRecord:
+    """Return the record of a run that has kept none, by its plan."""
+    return run_record(plan, status=RunStatus.UNKNOWN, started=datetime.now(timezone.utc))
 
 
 def plans_of(findings: ExperimentResult) -> list[tuple[Job, tuple[LoadedScenario, Plan]]]:
@@ -352,11 +357,8 @@ def in_sentence(counts: Mapping[str, int]) -> str:
 def judged(result: ClaimResult, link: str) -> JudgedClaim:
     """Return a claim as the page shows it."""
     return JudgedClaim(
-        says=result.claim.says,
-        source=result.claim.source,
-        note=result.claim.note,
+        claim=result.claim,
         measured=measured_words(result),
-        conditions=[str(condition) for condition in result.claim.holds_if],
         verdict=verdict(result),
         margin=margin_words(result.verdict),
         region=region_words(result),
@@ -460,7 +462,7 @@ def viewer_of(
             (lively, view) for view in _views(spec, title_of(findings, spec), [*shown, *beside]) if shown
         ]
     ordered = [view for _, view in sorted(drawn, key=lambda item: -item[0])]
-    settings = Settings([*views, *ordered], largest=LARGEST)
+    settings = Settings([*views, *ordered] or [View()], largest=LARGEST)
     runs = [*named.values(), *measured]
     alike = filtered_alike([run.results for run in runs])
     runs = [LabelledRun(run.label, results) for run, results in zip(runs, alike, strict=True)]
@@ -533,14 +535,9 @@ def settings(findings: ExperimentResult) -> Table:
     return Table("", [headings[k] for k in kept], [[row[k] for k in kept] for row in rows], [], numbers)
 
 
-def grid_of_times(runs: Iterable[tuple[Results | Plan, int]]) -> list[str]:
-    """Return each combination of algorithm, step size and stop time that occurs in plans or records."""
+def grid_of_times(runs: Iterable[tuple[RunRecord, int]]) -> list[str]:
+    """Return each combination of algorithm, step size and stop time that occurs in the records."""
     counts: Counter[str] = Counter()
     for run, number in runs:
-        algorithm: str
-        if isinstance(run, Plan):
-            algorithm, step, end = run.algorithm, float(run.step), run.time(run.n_steps)
-        else:
-            algorithm, step, end = run.record.algorithm, run.record.step_size, run.record.stop_time
-        counts[f"{algorithm}, {1000 * step:g} ms, until {end:g} s"] += number
+        counts[f"{run.algorithm}, {1000 * run.step_size:g} ms, until {run.stop_time:g} s"] += number
     return [f"{text} ({counted(count, 'run')})" for text, count in counts.items()]

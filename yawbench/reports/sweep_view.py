@@ -280,18 +280,10 @@ def _chosen(findings: ExperimentResult) -> dict[str, Any]:
         others = [k for k in names if k != of]
         first = [*others[:1], of, *others[1:2]] if of else names[:3]
     if spec.sampled and not drawn:  # what is drawn makes the map, and a listed axis its panels
-        first = [
-            *spec.drawn[:2],
-            *([""] if len(spec.drawn) == 1 else []),
-            *(k for k in named if k not in spec.drawn),
-        ]
-        return {
-            "limits": limits,
-            "metric": next(iter(limits), "") or next(iter(spec.metrics), ""),
-            "map": first[:3],
-        }
-    first = [k for k in dict.fromkeys(first) if k]
-    first += [k for k in names if k not in first and k not in spec.drawn]
+        apart = [""] if len(spec.drawn) == 1 else []
+        first = [*spec.drawn[:2], *apart, *(k for k in named if k not in spec.drawn)]
+    else:
+        first = [k for k in dict.fromkeys([*first, *names]) if k and (k in first or k not in spec.drawn)]
     return {
         "limits": limits,
         "metric": (drawn.metric if drawn else "") or next(iter(limits), "") or next(iter(spec.metrics), ""),

@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import accumulate, pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -82,6 +82,7 @@ class Settings:
             road alone, and still beyond it, of the road without the forces of the tyres. 0: no limit.
         ghosts: numbers of runs that are drawn faintly behind the others.
         bands: numbers of runs whose closed line is filled, behind all others; not over time.
+        offsets: number of a measured run -> time [s] by which it is drawn later at first.
         comparable: whether the runs are under the same conditions, so that the best of them stands beside one
             that was lost.
     """
@@ -93,6 +94,7 @@ class Settings:
     largest: int = 0
     ghosts: Sequence[int] = ()
     bands: Sequence[int] = ()
+    offsets: Mapping[int, float] = field(default_factory=dict)
     comparable: bool = True
 
 
@@ -210,6 +212,7 @@ def carried(
             for column in _columns(results, signal)
         ],
         "marks": [list(mark) for mark in settings.marks],
+        "offsets": dict(settings.offsets),
         "curves": [
             [x, y, text, [*xs], [*ys], run]
             for x_name, y_name, text, xs, ys, run in curves

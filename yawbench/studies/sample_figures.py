@@ -11,7 +11,7 @@ import numpy as np
 from yawbench.figures.style import literal
 from yawbench.foundation.errors import ResultsError
 
-from .axes import RUN, Level, names_of
+from .axes import Level
 from .axis_figures import GUIDE, ValueDrawing
 from .experiment import Case
 from .experiment_result import ExperimentResult
@@ -58,18 +58,11 @@ class DistributionDrawing(SampleDrawing):
 
     def _baseline(self, of: Group) -> Group | None:
         """Return the group that a group's differences are from; None if it is that itself."""
-        at = dict(of.levels)
+        lines = self.spec.lines
+        others = [(name, level) for name, level in of.levels if name != lines]
         for group in self.groups:
-            if group.run is not of.run and self.spec.lines != RUN:
-                continue
-            there = dict(group.levels)
-            others = [name for name in at if name != self.spec.lines]
-            if any(at[name] != there[name] for name in others):
-                continue
-            level = self.at(group.cases[0], self.spec.lines)
-            names = names_of(self.axes[self.spec.lines], level) if self.spec.lines in self.axes else (
-                level.value, level.words)  # fmt: skip
-            if self.spec.against in map(str, names):
+            alike = group.run is of.run and all(pair in group.levels for pair in others)
+            if alike and self._is_of(group.cases[0], lines, {self.spec.against}):
                 return None if group is of else group
         return None
 

@@ -8,7 +8,15 @@
   const rowsOf = (body) => [...body.rows].filter((row) => !row.classList.contains('group'));
   const all = bodies.flatMap(rowsOf);
   const plain = (text) => text.toLowerCase().replace(/\s*=\s*/g, '=');
-  const texts = new Map(all.map((row) => [row, plain(`${row.querySelector('input').value} ${row.textContent}`)]));
+  const texts = new Map(all.map((row) => [row, plain([row.querySelector('input').value, ...[...row.cells].map((cell) => cell.textContent)].join(' '))]));
+
+  // Whether a text has a word; a number is not the beginning of another: 0.3 is not in 0.35.
+  const has = (text, word) => {
+    for (let at = text.indexOf(word); at >= 0; at = text.indexOf(word, at + 1)) {
+      if (!/\d$/.test(word) || !/^\.?\d/.test(text.slice(at + word.length))) return true;
+    }
+    return false;
+  };
 
   // Show the rows that have all words; a folder stays folded until something is looked for.
   const show = () => {
@@ -18,7 +26,7 @@
       const open = words.length || body.querySelector('.group button')?.getAttribute('aria-expanded') !== 'false';
       let own = 0;
       for (const row of rowsOf(body)) {
-        const fits = words.every((word) => texts.get(row).includes(word));
+        const fits = words.every((word) => has(texts.get(row), word));
         own += fits;
         row.hidden = !fits || !open;
       }

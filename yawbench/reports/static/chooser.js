@@ -15,6 +15,12 @@ function startChooser() {
       if (link.hash === current?.hash) link.setAttribute('aria-current', 'true'); else link.removeAttribute('aria-current');
     }
     const turned = shown !== null;
+    const folded = [...root.querySelectorAll('section > details')];
+    const told = key !== shown && folded.find((one) => one.parentElement.id === key); // a study's claims
+    if (told) {
+      for (const one of folded) one.open = one === told;
+      if (turned) told.parentElement.scrollIntoView({block: 'nearest'});
+    }
     if (key && key !== shown) {
       shown = key;
       const picture = readAddress(frameOf(chosen).id); // before the viewer that is still there writes its own

@@ -13,6 +13,12 @@ const signed = (text) => text.replace('-', '−');
 
 function opacityOf(shade) { return (0.07 + (0.5 * shade) / (SHADES - 1)).toFixed(2); }
 
+// Where a value lies on an axis, from 0 to 1.
+function partOf({range, log}, value) {
+  const [low, here, high] = [range[0], value, range[1]].map((one) => (log ? Math.log(Math.abs(one)) : one));
+  return (here - low) / (high - low);
+}
+
 class Sweep extends InAddress {
   constructor(root, data) {
     super();
@@ -135,7 +141,7 @@ class Sweep extends InAddress {
 
   fill() {
     const {data, find} = this;
-    find('metric').append(...data.metrics.map((one) => new Option(one.unit ? `${one.label} in ${one.unit}` : one.label, one.name)));
+    find('metric').append(...data.metrics.map((one) => new Option(inUnit(one), one.name)));
     const axes = this.dims.filter((dim) => dim.discrete);
     for (const name of ['x', 'y', 'panel']) {
       const offered = name === 'panel' ? axes.filter((dim) => !dim.drawn) : axes;
@@ -234,8 +240,7 @@ class Sweep extends InAddress {
       const [x0, y0] = [(at % beside) * frame + left, Math.floor(at / beside) * high + top];
       let [px, py, w, h] = [x0 + cell.place[0] * cw, y0 + (up - 1 - cell.place[1]) * ch, cw - 1, ch - 1];
       if (!this.data.grid) {
-        const of = (dim, value) => { const [low, here, high] = (dim.log ? [dim.range[0], value, dim.range[1]].map((one) => Math.log(Math.abs(one))) : [dim.range[0], value, dim.range[1]]); return (here - low) / (high - low); };
-        const to = (dim, size) => (dim ? (dim.numbers ? of(dim, dim.at(cell.rows[0])) : (dim.level(cell.rows[0]) + 0.5) / dim.words.length) : 0.5) * size;
+        const to = (dim, size) => (dim ? (dim.numbers ? partOf(dim, dim.at(cell.rows[0])) : (dim.level(cell.rows[0]) + 0.5) / dim.words.length) : 0.5) * size;
         [px, py, w, h] = [x0 + to(x, across * cw - 8), y0 + up * ch - 8 - to(y, up * ch - 8), 8, 8];
       }
       const shade = cell.value === null ? 'none' : this.shade(cell.value);
@@ -253,7 +258,6 @@ class Sweep extends InAddress {
     const heads = maps.map((k, at) => {
       const [x0, y0] = [(at % beside) * frame + left, Math.floor(at / beside) * high + top];
       const title = panel ? `${panel.numbers ? `${panel.label} ` : ''}${panel.words[k]}${panel.unit ? ` ${panel.unit}` : ''}` : '';
-      const label = (dim) => `${dim.label}${dim.unit ? ` in ${dim.unit}` : ''}`;
       const every = x ? Math.ceil((6.6 * Math.max(...x.words.map((word) => word.length)) + 6) / cw) : 1;
       const named = x && this.data.grid && every <= across / 2; // else they are cut at the sides
       const below = named ? x.words.map((word, i) => (i % every ? '' : `<text class="ys-quiet" x="${(x0 + (i + 0.5) * cw).toFixed(1)}" y="${(y0 + up * ch + 13).toFixed(1)}" text-anchor="middle" font-size="11">${escaped(word)}</text>`)).join('') : '';
@@ -262,8 +266,8 @@ class Sweep extends InAddress {
         + ends(y).map(([part, word]) => `<text class="ys-quiet" x="${x0 - 5}" y="${(y0 + ch - part * (ch - 10)).toFixed(1)}" text-anchor="end" font-size="11">${escaped(word)}</text>`).join('');
       const steps = Math.ceil(13 / ch);
       const aside = y && this.data.grid ? y.words.map((word, j) => (j % steps ? '' : `<text class="ys-quiet" x="${(x0 - 5).toFixed(1)}" y="${(y0 + (up - 0.5 - j) * ch + 4).toFixed(1)}" text-anchor="end" font-size="11">${escaped(word)}</text>`)).join('') : '';
-      return `<text x="${x0}" y="${y0 - 8}" font-weight="600">${escaped(title)}${y ? `<tspan class="ys-quiet" font-weight="400">${title ? '; ' : ''}up: ${escaped(label(y))}</tspan>` : ''}</text>${border}${marks}${below}${aside}`
-        + (x ? `<text class="ys-quiet" x="${x0}" y="${y0 + up * ch + 29}">right: ${escaped(label(x))}${named || scattered ? '' : `, ${across} values`}</text>` : '');
+      return `<text x="${x0}" y="${y0 - 8}" font-weight="600">${escaped(title)}${y ? `<tspan class="ys-quiet" font-weight="400">${title ? '; ' : ''}up: ${escaped(inUnit(y))}</tspan>` : ''}</text>${border}${marks}${below}${aside}`
+        + (x ? `<text class="ys-quiet" x="${x0}" y="${y0 + up * ch + 29}">right: ${escaped(inUnit(x))}${named || scattered ? '' : `, ${across} values`}</text>` : '');
     });
     const total = Math.ceil(maps.length / beside) * high;
     holder.innerHTML = `<svg viewBox="0 0 ${wide} ${total + 36}" aria-hidden="true">${paths.join('')}${heads.join('')}${texts.join('')}`
@@ -278,7 +282,7 @@ class Sweep extends InAddress {
     const between = limit !== null && limit > low && limit < high;
     const sides = limit === null ? ['within'] : between ? (this.atMost ? ['within', 'beyond'] : ['beyond', 'within']) : [(limit >= high) === this.atMost ? 'within' : 'beyond'];
     const numbers = [low, ...(between ? [limit] : []), high].map((one) => (one === limit ? signed(String(limit)) : this.inCell(one)));
-    const words = `${metric.label}${metric.unit ? ` in ${metric.unit}` : ''}, all maps${limit === null ? '' : '; ◥ orange: beyond the limit'}`;
+    const words = `${inUnit(metric)}, all maps${limit === null ? '' : '; ◥ orange: beyond the limit'}`;
     let x = 0;
     const parts = [`<text class="ys-quiet" x="0" y="${y}">${escaped(words)}</text>`];
     const number = (text) => {
@@ -342,8 +346,7 @@ class Sweep extends InAddress {
 
   high(dim, value) {
     if (value === null || value === undefined) return LINES_HIGH - 12;
-    const [low, top] = dim.log ? dim.range.map(Math.log) : dim.range;
-    return 58 + (LINES_HIGH - 96) * (1 - ((dim.log ? Math.log(value) : value) - low) / (top - low));
+    return 58 + (LINES_HIGH - 96) * (1 - partOf(dim, value));
   }
 
   line(row) { return 'M' + this.shownDims.map((dim, k) => `${this.xs[k]} ${this.high(dim, dim.at(row)).toFixed(1)}`).join('L'); }
@@ -370,7 +373,7 @@ class Sweep extends InAddress {
     const axes = dims.map((dim, k) => {
       const x = this.xs[k];
       const brush = this.state.brush[dim.id];
-      const label = `${dim.label}${dim.unit ? ` in ${dim.unit}` : ''}`;
+      const label = inUnit(dim);
       const step = dims.length > 1 ? this.xs[1] - this.xs[0] : wide;
       const last = k === dims.length - 1 && k > 0;
       const room = Math.max(8, Math.floor((k === 0 || last ? edge + step / 2 - 8 : step - 6) / 6.6)); // characters beside the neighbours

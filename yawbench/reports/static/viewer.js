@@ -206,14 +206,14 @@ class Viewer extends InAddress {
     find('add').list.append(...names.map(([name, {label}]) => made('option', label, {value: name})));
     if (data.runs.some((run) => run.road)) return;
     find('main').classList.add('yv-alone');
-    find('play').remove();
+    for (const one of this.root.querySelectorAll('.yv-play')) one.remove();
     find('road').remove();
   }
 
   initial() {
     return {
       view: 0, ...this.viewed(0), span: null, heights: {}, tall: [], time: this.data.still, pin: null, lit: null,
-      difference: false, tolerance: 0, camera: 'cars', look: [0, 0], near: 1, offsets: {},
+      difference: false, tolerance: 0, camera: 'cars', look: [0, 0], near: 1, offsets: {...this.data.offsets},
     };
   }
 
@@ -239,7 +239,7 @@ class Viewer extends InAddress {
       span: (v) => v === null || isSpan(v),
       heights: (v) => isRecord(v) && Object.values(v).every(isSpan), tall: (v) => Array.isArray(v) && v.every((one) => typeof one === 'string'),
       pin: (v) => v === null || Number.isFinite(v),
-      lit: (v) => v === null || (Array.isArray(v) && v.length === 3 && typeof v[0] === 'string' && this.known(v[0]) && (v[1] === null || Number.isFinite(v[1])) && typeof v[2] === 'string'),
+      lit: (v) => v === null || (Array.isArray(v) && v.length === 3 && typeof v[0] === 'string' && (v[1] === null || Number.isFinite(v[1])) && typeof v[2] === 'string'),
       time: Number.isFinite, difference: (v) => typeof v === 'boolean', tolerance: (v) => Number.isFinite(v) && v >= 0,
       x: (v) => this.axes().includes(v), camera: (v) => ['cars', 'whole', ...CAMERAS].includes(v) || isRun(v),
       look: (v) => Array.isArray(v) && v.length === 2 && v.every(Number.isFinite),
@@ -257,7 +257,7 @@ class Viewer extends InAddress {
   restore() {
     if (!super.restore()) return false;
     const {lit} = this.state;
-    if (!lit || readAddress(this.key)?.has('time')) return true;
+    if (!lit || !this.known(lit[0]) || readAddress(this.key)?.has('time')) return true;
     const own = this.state.panels.find((spec) => spec.split(',').includes(lit[0])) ?? lit[0];
     this.state.panels = [own, ...this.state.panels.filter((spec) => spec !== own)];
     const run = this.lead();
@@ -360,7 +360,7 @@ class Viewer extends InAddress {
     return run.grain(name) + (this.state.difference && run !== this.baseline ? this.baseline.grain(name) : 0);
   }
 
-  // The signals of a text of the reader, by name, by variable, by label or by a part of one, as a panel names them.
+  // The signals of a text of the reader, by name, by variable, by label or by words of these, as a panel names them.
   // Throw a sentence for the reader if there are none or several.
   named(text) {
     const signal = (part) => (/^ [-+] $/.test(part) ? part : this.signalOf(part.trim()));
@@ -371,17 +371,20 @@ class Viewer extends InAddress {
     const {signals, partial} = this.data;
     if (text in signals) return text;
     const wanted = text.toLowerCase();
-    const words = (name) => {
-      const {label, unit, fed = []} = signals[name];
-      return [name, name.slice(name.indexOf('.') + 1), ...fed, label, unit ? `${label} in ${unit}` : label].map((one) => one.toLowerCase());
-    };
-    const every = Object.keys(signals);
-    const whole = every.filter((name) => words(name).includes(wanted));
-    const found = whole.length ? whole : every.filter((name) => words(name).some((one) => one.includes(wanted)));
-    if (found.length === 1) return found[0];
-    const more = found.length > NAMED ? ` and ${found.length - NAMED} more` : '';
-    if (found.length) throw new Error(`${text} may be ${found.slice(0, NAMED).join(', ')}${more}`);
-    throw new Error(partial ? `this page has no signal ${text}; yawbench plot --page shows all that was recorded` : `no signal ${text} was recorded`);
+    const told = Object.entries(signals).map(([name, signal]) => ({
+      name, says: [name, name.slice(name.indexOf('.') + 1), ...signal.fed ?? [], signal.label, inUnit(signal)].map((one) => one.toLowerCase()),
+    }));
+    const words = wanted.split(/[^\p{L}\p{N}]+/u).filter(Boolean);
+    const share = ({says}) => words.filter((word) => says.some((one) => one.includes(word))).length;
+    const whole = told.filter(({says}) => says.includes(wanted));
+    const most = Math.max(...told.map(share), 1);
+    const found = whole.length ? whole : told.filter((one) => share(one) === most);
+    const sure = whole.length || most === words.length;
+    if (found.length === 1 && sure) return found[0].name;
+    const names = found.slice(0, NAMED).map(({name}) => name).join(', ') + (found.length > NAMED ? ` and ${found.length - NAMED} more` : '');
+    if (sure && found.length) throw new Error(`${text} may be ${names}`);
+    const where = partial ? '; yawbench plot --page shows all that was recorded' : '';
+    throw new Error(`${partial ? `this page has no signal ${text}` : `no signal ${text} was recorded`}${names ? `; near are ${names}` : ''}${where}`);
   }
 
   known(spec) { return spec.split(',').every((name) => partsOf(name.trim()).every((part) => part in this.data.signals)); }
@@ -403,8 +406,7 @@ class Viewer extends InAddress {
     const {x} = this.state;
     if (x === 'time') return 't in s';
     if (x === 'distance') return 'distance in m';
-    const {label, unit} = this.data.signals[x];
-    return unit ? `${label} in ${unit}` : label;
+    return inUnit(this.data.signals[x]);
   }
 
   whole() {
@@ -553,6 +555,7 @@ class Viewer extends InAddress {
     this.readTheme();
     this.shift();
     this.drawTable();
+    this.tellMissing();
     const holder = this.find('panels');
     this.panels = this.state.panels.map((spec) => new Panel(this, spec));
     this.root.classList.toggle('yv-pinned', this.state.pin !== null);
@@ -667,17 +670,15 @@ class Viewer extends InAddress {
       if (this.state.tolerance) this.state.difference = true;
       this.refresh();
     });
-    this.find('all').addEventListener('click', () => this.showWhole());
-    this.find('pin').addEventListener('click', () => this.setPin());
-    this.find('undo').addEventListener('click', () => this.undo());
-    this.find('reset').addEventListener('click', () => this.reset());
-    this.find('in').addEventListener('click', () => this.zoom(1.6));
-    this.find('out').addEventListener('click', () => this.zoom(1 / 1.6));
-    this.find('csv').addEventListener('click', () => saveFile(new Blob([this.csv()], {type: 'text/csv'}), this.fileName('csv')));
-    this.find('png').addEventListener('click', () => this.picture().toBlob((blob) => saveFile(blob, this.fileName('png'))));
-    this.find('svg').addEventListener('click', () => saveFile(new Blob([this.drawing()], {type: 'image/svg+xml'}), this.fileName('svg')));
+    const clicked = {
+      all: () => this.showWhole(), pin: () => this.setPin(), undo: () => this.undo(), reset: () => this.reset(), in: () => this.zoom(1.6), out: () => this.zoom(1 / 1.6),
+      csv: () => saveFile(new Blob([this.csv()], {type: 'text/csv'}), this.fileName('csv')),
+      png: () => this.picture().toBlob((blob) => saveFile(blob, this.fileName('png'))),
+      svg: () => saveFile(new Blob([this.drawing()], {type: 'image/svg+xml'}), this.fileName('svg')),
+      link: ({target}) => { this.remember(); copyAddress(target); },
+    };
+    for (const [name, act] of Object.entries(clicked)) this.find(name).addEventListener('click', act);
     this.find('more').addEventListener('toggle', () => this.tellCommand());
-    this.find('link').addEventListener('click', (event) => { this.remember(); copyAddress(event.target); });
     this.find('slider').addEventListener('input', (event) => this.seek(Number(event.target.value)));
     const keys = this.data.alone ? document : this.root; // several viewers of a page: the one with the focus
     keys.addEventListener('keydown', (event) => this.pressed(event), {signal: this.removal.signal});
@@ -691,11 +692,21 @@ class Viewer extends InAddress {
     field.reportValidity();
   }
 
+  // A claim may judge a signal that the page does not carry: which, and where it is.
+  tellMissing() {
+    const {lit} = this.state;
+    const place = this.find('missing');
+    place.hidden = !lit || this.known(lit[0]);
+    if (place.hidden) return;
+    const command = plotOf(this.runs.filter((run) => this.shows(run)), ['--page', '--panel', lit[0]]);
+    place.replaceChildren(`Judged: ${lit[2]}. This page does not carry ${lit[0]}${command ? '; it is in the page of ' : ''}`, ...(command ? [made('code', command)] : []), '.');
+  }
+
   // The command that draws what is shown.
   tellCommand() {
     const command = commandOf(this);
     this.find('command').textContent = command;
-    this.find('command').hidden = !command;
+    this.find('told').hidden = !command;
   }
 
   // The view on a canvas, and as SVG.

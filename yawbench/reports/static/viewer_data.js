@@ -13,6 +13,9 @@ function made(tag, content = '', properties = {}) {
   return element;
 }
 
+// What an axis shows, with its unit.
+function inUnit({label, unit}) { return unit ? `${label} in ${unit}` : label; }
+
 const WHEELS = ['fl', 'fr', 'rl', 'rr'];
 
 const NOT_FINITE = [NaN, -Infinity, Infinity];

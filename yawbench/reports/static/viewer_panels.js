@@ -70,9 +70,17 @@ function ticks(u, splits) {
   return splits.map((value) => (value == null ? '' : decimal(value, decimals)));
 }
 
+class Chart {
+  // Draw the span anew; what the chart has beside it stays.
+  zoom() {
+    const [min, max] = this.viewer.span();
+    this.plot?.setScale('x', {min, max});
+  }
+}
+
 // The axis below all panels, and the pin and the cursor on it: it stays in sight.
-class Axis {
-  constructor(viewer) { Object.assign(this, {viewer, chart: viewer.find('axis')}); }
+class Axis extends Chart {
+  constructor(viewer) { Object.assign(super(), {viewer, chart: viewer.find('axis')}); }
 
   draw(wide) {
     const {viewer} = this;
@@ -86,18 +94,11 @@ class Axis {
     }, [viewer.span(), [0, 0]], this.chart);
     this.plot.root.setAttribute('aria-hidden', 'true');
   }
-
-  zoom() {
-    const [min, max] = this.viewer.span();
-    this.plot?.setScale('x', {min, max});
-  }
 }
 
-class Panel {
+class Panel extends Chart {
   constructor(viewer, spec) {
-    this.viewer = viewer;
-    this.spec = spec;
-    this.signals = spec.split(',').map((name) => name.trim());
+    Object.assign(super(), {viewer, spec, signals: spec.split(',').map((name) => name.trim())});
     this.build();
   }
 
@@ -125,8 +126,7 @@ class Panel {
   get meaning() { return this.viewer.meaning(this.signals[0]); }
 
   get title() {
-    const {label, unit} = this.meaning;
-    return (unit ? `${label} in ${unit}` : label) + (this.viewer.state.difference ? `, ${this.viewer.drawnInstead}` : '');
+    return inUnit(this.meaning) + (this.viewer.state.difference ? `, ${this.viewer.drawnInstead}` : '');
   }
 
   // The angle after which a line breaks.
@@ -227,12 +227,6 @@ class Panel {
   get frame() {
     const {bbox: {left, top, width, height}, scales: {x, y}} = this.plot;
     return {left, top, width, height, across: x, up: y};
-  }
-
-  // Draw the span anew; what the panel has beside it stays.
-  zoom() {
-    const [min, max] = this.viewer.span();
-    this.plot?.setScale('x', {min, max});
   }
 
   // Vertical limits: those of the reader, else all values within the horizontal span, and some room.

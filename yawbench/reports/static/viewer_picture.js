@@ -162,13 +162,23 @@ function svgOf(viewer, width = PICTURE_WIDE) {
   return paper.text(width, Math.round(layout.height));
 }
 
-// The command that draws the shown signals of the shown runs into a file, in the figures' own style.
-function commandOf(viewer) {
-  const {x} = viewer.state;
+// A command line; without runs that a folder has, ''.
+function plotOf(runs, options) {
+  if (!runs.length || runs.some(({folder}) => !folder)) return '';
   const word = (text) => (/^[\w./,=:~+@%-]+$/.test(text) ? text : `'${text.replaceAll("'", "'\\''")}'`);
-  const {baseline, state: {difference}} = viewer;
-  const folders = viewer.runs.filter((run) => viewer.shows(run) || (difference && run === baseline)).map((run) => run.folder);
-  if (!folders.length || folders.some((one) => !one)) return '';
-  const panels = viewer.state.panels.map((spec) => spec.split(',')[0]).map((name) => (viewer.portrait ? `${name}(${x})` : name));
-  return ['yawbench', 'plot', ...folders, ...panels.flatMap((name) => ['--panel', name]), ...(difference ? ['--minus', baseline.folder] : []), '--format', 'svg'].map(word).join(' ');
+  return ['yawbench', 'plot', ...runs.map(({folder}) => folder), ...options].map(word).join(' ');
+}
+
+// The command that draws what is shown into a file, in the figures' own style; '' where figures have no such view.
+function commandOf(viewer) {
+  const {baseline, portrait, state: {x, difference, span, panels}} = viewer;
+  const [from, to] = viewer.span();
+  const timed = x === 'time' && span;
+  const runs = viewer.runs.filter((run) => (viewer.shows(run) || (difference && run === baseline)) && !(timed && (run.end <= from || run.start >= to)));
+  const names = panels.map((spec) => spec.split(',')[0]).map((name) => (portrait ? `${name}(${x})` : name));
+  if (x === 'distance' || (portrait && (difference || names.some((name) => partsOf(name).length > 1)))) return '';
+  return plotOf(runs, [
+    ...runs.flatMap(({label}) => ['--label', label]), ...names.flatMap((name) => ['--panel', name]),
+    ...(difference ? ['--minus', baseline.folder] : []), ...(timed ? ['--during', `${Number(from.toFixed(6))} to ${Number(to.toFixed(6))} s`] : []), '--format', 'svg',
+  ]);
 }

@@ -53,14 +53,10 @@ function stateAt(run, t) {
   return state;
 }
 
-// Whether a step is that of an angle which leaves its range at one end and comes back at the other.
-function turns(channel, step) {
-  return channel === 'sideslip' && Math.abs(step) > Math.PI;
-}
-
+// An angle may leave its range at one end and come back at the other.
 function between(channel, from, to, part) {
   const turn = 2 * Math.PI * Math.sign(to - from);
-  if (!turns(channel, to - from)) return from + part * (to - from);
+  if (channel !== 'sideslip' || Math.abs(to - from) <= Math.PI) return from + part * (to - from);
   const value = from + part * (to - turn - from);
   return Math.abs(value) > Math.PI ? value + turn : value;
 }
@@ -105,13 +101,14 @@ function forceScale(runs) {
 
 class Road {
   constructor(viewer) {
-    Object.assign(this, {viewer, playing: false, rate: 1, view: {camera: 'cars'}});
+    Object.assign(this, {viewer, playing: false, rate: 1, view: {}});
     const find = viewer.find;
-    Object.assign(this, {scene: find('scene'), button: find('play'), closeUps: find('closeups'), camera: find('camera')});
+    Object.assign(this, {scene: find('scene'), buttons: viewer.root.querySelectorAll('.yv-play'), closeUps: find('closeups'), camera: find('camera')});
     this.cars = viewer.runs.filter((run) => run.road && run.road.x);
     for (const run of this.cars) {
       run.channels = channelsOf(run);
       Object.assign(run, run.road.outline, {ground: viewer.data.grounds[run.road.ground ?? -1] || []});
+      run.laid = laid(run.lanes);
       const grips = WHEELS.map((wheel) => extremes(run.channels['grip_' + wheel] || [0])[1]);
       run.widest = Math.max(...grips, 0);
     }
@@ -120,7 +117,7 @@ class Road {
       const [low, high] = extremes(run.channels.yaw_moment || [], [0, 0]);
       return Math.max(high, -low);
     }), 0);
-    this.button.addEventListener('click', () => this.toggle());
+    for (const button of this.buttons) button.addEventListener('click', () => this.toggle());
     find('rate').addEventListener('change', (event) => { this.rate = Number(event.target.value); });
     this.camera.addEventListener('change', (event) => {
       const chosen = event.target.value;
@@ -156,6 +153,7 @@ class Road {
       [run.colour, run.dash] = [viewer.colour(run), viewer.dash(run)];
     }
     this.shown = this.cars.filter((run) => viewer.shows(run));
+    this.view.lanes = [...new Map([...this.shown].reverse().map((run) => [run.lanes.join(), run])).values()]; // alike ones once
     this.closeUps.replaceChildren(...this.shown.map((run) => {
       const figure = made('figure', made('canvas', '', {role: 'img', ariaLabel: `Tyre forces of ${run.label}`}));
       const caption = made('figcaption', '', {innerHTML: viewer.swatch(run)});
@@ -166,7 +164,7 @@ class Road {
       return figure;
     }));
     const chosen = String(viewer.state.camera);
-    const views = [['cars', this.shown.length > 1 ? 'all cars' : 'car'], ...(this.shown.length > 1 ? this.shown.map((run) => [String(run.number), run.label]) : []), ['whole', 'whole path'], ...CAMERAS.map((one) => [one, `3-D: ${one}`])];
+    const views = [['cars', this.shown.length > 1 ? 'all cars' : 'car'], ...(this.shown.length > 1 ? this.shown.map((run) => [String(run.number), run.label]) : []), ['whole', 'whole path'], ...CAMERAS.map((one) => [one, `3-D: ${SPACE[one].says}`])];
     this.camera.replaceChildren(...views.map(([value, words]) => new Option(words, value)));
     this.camera.value = views.some(([value]) => value === chosen) ? chosen : 'cars';
   }
@@ -183,12 +181,12 @@ class Road {
     this.states = states;
     this.inSpace = CAMERAS.includes(chosen) && this.shown.length > 0;
     this.scene.classList.toggle('yv-space', this.inSpace);
-    this.scene.ariaLabel = this.inSpace ? `The cars in three dimensions, ${chosen} camera` : 'The road from above';
+    this.scene.ariaLabel = this.inSpace ? `The cars in three dimensions, ${SPACE[chosen].says}` : 'The road from above';
     if (!this.shown.length) { surface(this.scene, density); return; }
     if (this.inSpace) {
       const {look, near} = viewer.state;
       const lead = Math.max(this.shown.indexOf(viewer.lead()), 0);
-      drawSpace(this.scene, density, this.shown, states, {camera: chosen, lead, look, near, scale: this.scale, strongest: this.strongest, time});
+      drawSpace(this.scene, density, this.shown, states, {camera: chosen, lead, lanes: this.view.lanes, look, near, scale: this.scale, strongest: this.strongest, time});
     } else drawScene(this.scene, density, this.shown, states, this.view, this.scale);
     [...this.closeUps.querySelectorAll('canvas')].forEach((canvas, i) => {
       drawCloseUp(canvas, density, this.shown[i], i, states[i], this.scale, this.strongest);
@@ -203,7 +201,7 @@ class Road {
     if (!this.touched || viewer.state.time >= end) viewer.state.time = start;
     this.touched = true;
     this.playing = true;
-    this.button.textContent = 'Pause';
+    this.offer('Pause');
     let before = null;
     const next = (now) => {
       if (!this.playing) return;
@@ -220,6 +218,8 @@ class Road {
   pause() {
     this.playing = false;
     this.touched = true;
-    this.button.textContent = 'Play';
+    this.offer('Play');
   }
+
+  offer(words) { for (const button of this.buttons) button.textContent = words; }
 }

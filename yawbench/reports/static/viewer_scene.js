@@ -64,27 +64,33 @@ function gridWords(c, eye, width, height) {
   }
 }
 
-// Friction by place: from white, 1 and more, to blue, none.
-function ground(c, run) {
-  for (const [friction, corners] of run.ground) {
-    const less = 1 - Math.min(friction, 1);
-    filled(c, `rgb(${255 - 135 * less}, ${255 - 75 * less}, ${255 - 25 * less})`, corners);
+// Paint friction by place, from white, 1 and more, to blue, none, where it is in sight.
+function paintFriction(runs, fill, inSight = () => true) {
+  for (const ground of new Set(runs.map((run) => run.ground))) {
+    for (const [friction, corners] of ground) {
+      const less = 1 - Math.min(friction, 1);
+      if (inSight(corners)) fill(corners, `rgb(${255 - 135 * less}, ${255 - 75 * less}, ${255 - 25 * less})`);
+    }
   }
+}
+
+// Where lanes lie, and where their cones touch them, with the side on which these stand.
+function laid(lanes) {
+  return lanes.map(([start, end, right, left]) => {
+    const pieces = Math.ceil((end - start) / CONES);
+    const xs = Array.from({length: pieces + 1}, (_, i) => start + (i * (end - start)) / pieces);
+    return {corners: [[start, right], [end, right], [end, left], [start, left]], cones: xs.flatMap((x) => [[x, left, 1], [x, right, -1]])};
+  });
 }
 
 function lanes(c, run, px, onGround) {
   const size = Math.max(0.15, 2.2 * px);
-  for (const [start, end, right, left] of run.lanes) {
-    c.fillStyle = LANE;
-    if (!onGround) c.fillRect(start, right, end - start, left - right);
-    const pieces = Math.ceil((end - start) / CONES);
+  for (const {corners, cones} of run.laid) {
+    if (!onGround) filled(c, LANE, corners);
     c.fillStyle = '#8a4b00';
-    for (let i = 0; i <= pieces; i++) {
-      const x = start + (i * (end - start)) / pieces;
-      for (const [y, out] of [[left, 1], [right, -1]]) {
-        circle(c, x, y + out * size, size);
-        c.fill();
-      }
+    for (const [x, y, out] of cones) {
+      circle(c, x, y + out * size, size);
+      c.fill();
     }
   }
 }
@@ -98,13 +104,9 @@ function drawScene(canvas, density, runs, states, view, scale) {
   c.translate(width / 2, height / 2);
   c.scale(eye.scale, -eye.scale);
   c.translate(-eye.x, -eye.y);
-  for (const run of runs) ground(c, run);
+  paintFriction(runs, (corners, colour) => filled(c, colour, corners));
   grid(c, eye, width, height);
-  const seen = new Set();
-  for (const run of runs) {
-    const same = JSON.stringify(run.lanes);
-    if (seen.has(same)) continue;
-    seen.add(same);
+  for (const run of view.lanes) {
     lanes(c, run, px, runs.some((one) => one.ground.length));
     if ('path_y' in run.channels) {
       polyline(c, run.channels.x, run.channels.path_y);

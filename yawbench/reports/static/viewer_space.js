@@ -1,13 +1,13 @@
 // The scene in three dimensions on a canvas: cars with roll and pitch, wheels, forces, cones, ground, from four
 // cameras. Axes are those of ISO 8855: x forward, y to the left, z up. One car is solid, the others are ghosts.
 
-const CAMERAS = ['chase', 'side', 'fixed', 'orbit'];
 const SPACE = {
-  chase: {turn: Math.PI, rise: 0.3, far: 9, with: true}, // where the eye is: angle from the car's or the road's
-  side: {turn: -Math.PI / 2, rise: 0.12, far: 8, with: true}, // x axis, angle above the road, distance [m];
-  fixed: {turn: -2.0, rise: 0.16, far: 30, with: false}, // whether it turns with the car. Chosen: all of the car
-  orbit: {turn: -2.4, rise: 0.45, far: 12, with: false}, // and of its forces in sight
-};
+  chase: {says: 'from behind', turn: Math.PI, rise: 0.3, far: 9, with: true}, // where the eye is: angle from the
+  side: {says: 'from the side', turn: -Math.PI / 2, rise: 0.12, far: 8, with: true}, // car's or the road's x axis,
+  fixed: {says: 'from the roadside', turn: -2.0, rise: 0.16, far: 30, with: false}, // angle above the road,
+  orbit: {says: 'from around', turn: -2.4, rise: 0.45, far: 12, with: false}, // distance [m]; whether it turns with
+}; // the car. Chosen: all of the car and of its forces in sight
+const CAMERAS = Object.keys(SPACE);
 const NEAREST = 0.3; // what is nearer to the eye is not drawn [m]
 const SEEN = 90; // how far ground and cones are drawn [m]; chosen: beyond, they are specks
 const FIELD = 1.1; // width of the picture over its distance; chosen: an angle of 58 degrees
@@ -164,42 +164,28 @@ function eyeOf(camera, state, run, look, near, width, height) {
   return new Eye(from, to, width, height, 3 * focus * near * zoom);
 }
 
-function paintGround(p, runs, at) {
+function paintGround(p, runs, lanes, at) {
   const {context: c, eye} = p;
   const horizon = eye.height / 2 + (eye.focus * eye.ahead[2]) / Math.hypot(eye.ahead[0], eye.ahead[1]);
   c.globalAlpha = 0.5;
   c.fillStyle = LINE;
   c.fillRect(0, Math.max(horizon, 0), eye.width, eye.height);
   c.globalAlpha = 1;
-  const near = (x, y) => Math.hypot(x - at[0], y - at[1]) < SEEN;
-  const seen = new Set();
-  for (const run of runs) {
-    if (seen.has(run.ground)) continue;
-    seen.add(run.ground);
-    for (const [friction, corners] of run.ground) {
-      const xs = extremes(corners.map((one) => one[0]));
-      const ys = extremes(corners.map((one) => one[1]));
-      if (xs[0] > at[0] + SEEN || xs[1] < at[0] - SEEN || ys[0] > at[1] + SEEN || ys[1] < at[1] - SEEN) continue;
-      const less = 1 - Math.min(friction, 1);
-      p.fill(corners.map(([x, y]) => [x, y, 0]), `rgb(${255 - 135 * less}, ${255 - 75 * less}, ${255 - 25 * less})`);
-    }
-  }
+  const flat = (corners) => corners.map(([x, y]) => [x, y, 0]);
+  const inSight = (corners) => [0, 1].every((k) => {
+    const [low, high] = extremes(corners.map((one) => one[k]));
+    return low <= at[k] + SEEN && high >= at[k] - SEEN;
+  });
+  paintFriction(runs, (corners, colour) => p.fill(flat(corners), colour), inSight);
   const [x0, y0] = at.map((one) => 10 * Math.round(one / 10));
   for (let k = -60; k <= 60; k += 10) {
     p.line([[x0 + k, y0 - 60, 0], [x0 + k, y0 + 60, 0]], LINE, 1);
     p.line([[x0 - 60, y0 + k, 0], [x0 + 60, y0 + k, 0]], LINE, 1);
   }
-  const drawn = new Set();
-  for (const run of runs) {
-    if (drawn.has(JSON.stringify(run.lanes))) continue;
-    drawn.add(JSON.stringify(run.lanes));
-    for (const [start, end, right, left] of run.lanes) {
-      p.fill([[start, right, 0], [end, right, 0], [end, left, 0], [start, left, 0]], LANE);
-      const pieces = Math.ceil((end - start) / CONES);
-      for (let i = 0; i <= pieces; i++) {
-        const x = start + (i * (end - start)) / pieces;
-        for (const [y, out] of [[left, 1], [right, -1]]) if (near(x, y)) paintCone(p, x, y + out * CONE[0]);
-      }
+  for (const run of lanes) {
+    for (const {corners, cones} of run.laid) {
+      p.fill(flat(corners), LANE);
+      for (const [x, y, out] of cones) if (Math.hypot(x - at[0], y - at[1]) < SEEN) paintCone(p, x, y + out * CONE[0]);
     }
     if (run.along.path) p.line(run.along.path, QUIET, 1.5, [5, 4]);
   }
@@ -309,13 +295,13 @@ function paintCircles(p, run, state, {ghost, scale}) {
 }
 
 // Draw cars and ground from a camera; `lead`: number of the car that it follows among `runs`.
-function drawSpace(canvas, density, runs, states, {camera, lead, look, near, scale, strongest, time}) {
+function drawSpace(canvas, density, runs, states, {camera, lead, lanes, look, near, scale, strongest, time}) {
   const {context, width, height} = surface(canvas, density);
   if (!width || !height) return;
   const eye = eyeOf(camera, states[lead], runs[lead], look, near, width, height);
   const p = new Painter(context, eye);
   for (const run of runs) run.along ??= thinnedPath(run.channels);
-  paintGround(p, runs, [states[lead].x, states[lead].y]);
+  paintGround(p, runs, lanes, [states[lead].x, states[lead].y]);
   const settings = (i) => ({ghost: i !== lead, scale, strongest, time});
   runs.forEach((run, i) => {
     const {own, step} = run.along;
