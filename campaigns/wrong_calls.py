@@ -257,7 +257,7 @@ def _parameters() -> Iterator[Parameter]:
              right={"number as text", "path", "link to a folder", "point"},
              may={*PRINTABLE, "link to nothing", "link to itself", "device", *COLOURED})  # fmt: skip
     yield of("Run.save.format", lambda x: b.run.save("saved", format=x))
-    yield of("within.limit", lambda x: yb.within(x, len, ()), "limit", right=FINITE - NOT_ABOVE_0)
+    yield of("within.limit", lambda x: yb.within(x, len, ()), "limit", may=FINITE)
     yield of("within.function", lambda x: yb.within(60, x), "function")
     yield of("view.runs", lambda x: yb.view(x), "runs", "a viewer shows")
     yield of("view.runs [run]", lambda x: yb.view({"a": x}), "runs")

@@ -2,7 +2,8 @@
 
 `Process` is this process's side of a child. A `Worker` is a child of the fork server that calls functions:
 those of pools (`workers`), and those with isolated instances (`master.isolation`). A run in a child process
-(`master.child_run`) is a copy of this one, and so is the child of a `call_in_copy`. docs/processes.md tells which code runs where, and how each ends.
+(`master.child_run`) is a copy of this one, as is the child of `call_in_copy`. docs/processes.md tells which
+code runs where, and how each ends.
 
 The fork server imports the modules that its children need, and copies itself in milliseconds. That of
 multiprocessing, on which pebble and loky are built, would run the user's script in every child, give it the
