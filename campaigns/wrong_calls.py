@@ -258,7 +258,9 @@ def _parameters() -> Iterator[Parameter]:
              may={*PRINTABLE, "link to nothing", "link to itself", "device", *COLOURED})  # fmt: skip
     yield of("Run.save.format", lambda x: b.run.save("saved", format=x))
     yield of("within.limit", lambda x: yb.within(x, len, ()), "limit", may=FINITE)
-    yield of("within.function", lambda x: yb.within(60, x), "function")
+    yield of("within.function", lambda x: yb.within(60, x), "function",
+             skip={"type", "lambda of x", "builtin type method"},  # raise their own errors
+             right={"class", "class of ours", "lambda", "lambda of all", "builtin"})  # fmt: skip
     yield of("view.runs", lambda x: yb.view(x), "runs", "a viewer shows")
     yield of("view.runs [run]", lambda x: yb.view({"a": x}), "runs")
     yield of("view.panels", lambda x: yb.view(b.run, x), "panel")
