@@ -257,6 +257,10 @@ def _parameters() -> Iterator[Parameter]:
              right={"number as text", "path", "link to a folder", "point"},
              may={*PRINTABLE, "link to nothing", "link to itself", "device", *COLOURED})  # fmt: skip
     yield of("Run.save.format", lambda x: b.run.save("saved", format=x))
+    yield of("within.limit", lambda x: yb.within(x, len, ()), "limit", may=FINITE)
+    yield of("within.function", lambda x: yb.within(60, x), "function",
+             skip={"type", "lambda of x", "builtin type method"},  # raise their own errors
+             right={"class", "class of ours", "lambda", "lambda of all", "builtin"})  # fmt: skip
     yield of("view.runs", lambda x: yb.view(x), "runs", "a viewer shows")
     yield of("view.runs [run]", lambda x: yb.view({"a": x}), "runs")
     yield of("view.panels", lambda x: yb.view(b.run, x), "panel")
@@ -373,6 +377,7 @@ def _parameters() -> Iterator[Parameter]:
     for name in ("caption", "label"):
         yield of(f"Runs.to_latex.{name}", lambda x, n=name: b.draws.to_latex(**{n: x}), name,
                  may={"None", *TEXTS})  # fmt: skip
+    yield of("Runs.to_latex.of", lambda x: b.draws.to_latex(of=x), "of", "there are")
     # Steps.
     yield of("SteppedRun.__getitem__.name", lambda x: b.stepped(lambda run: run[x]), "name", "variable",
              "column")  # fmt: skip

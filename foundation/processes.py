@@ -2,7 +2,8 @@
 
 `Process` is this process's side of a child. A `Worker` is a child of the fork server that calls functions:
 those of pools (`workers`), and those with isolated instances (`master.isolation`). A run in a child process
-(`master.child_run`) is a copy of this one. docs/processes.md tells which code runs where, and how each ends.
+(`master.child_run`) is a copy of this one, as is the child of `call_in_copy`. docs/processes.md tells which
+code runs where, and how each ends.
 
 The fork server imports the modules that its children need, and copies itself in milliseconds. That of
 multiprocessing, on which pebble and loky are built, would run the user's script in every child, give it the
@@ -546,6 +547,56 @@ class Worker(Process):
         self._sent[number] = item  # refers to it, so that no other object gets its number
         of_item = {field.name: getattr(item, field.name) for field in fields(item)}  # type: ignore[arg-type]
         return _keep, (number, type(item), of_item)
+
+
+def call_in_copy(function: Callable[..., Any], arguments: Sequence[Any], limit: float) -> Any:
+    """Call a function in a copy of this process and return its value.
+
+    Args:
+        function: anything that can be called; its value must be possible to pickle.
+        arguments: of the function.
+        limit: time after which the copy is killed [s].
+
+    Raises:
+        ProcessLost: it did not return in time (`late`), or ended its process.
+        Exception: raised by the function.
+    """
+    copy = _Copy(partial(_answer_call, function, arguments), limit)
+    try:
+        value, error = copy.hear("answer")
+    finally:
+        copy.close(kill=True)
+    if error is not None:
+        raise error
+    return value
+
+
+class _Copy(Process):
+    """A copy of this process that answers once.
+
+    Args:
+        run: answers, in the copy, through its ends of the pipes.
+        limit: time that it has [s].
+    """
+
+    longest: ClassVar[float] = math.inf
+
+    def __init__(self, run: Callable[[int, int], None], limit: float) -> None:
+        super().__init__(lambda *pipes: Child(fork(partial(run, *pipes), pipes)))
+        self._deadline = time.monotonic() + limit
+
+    def check_time(self) -> None:
+        if time.monotonic() > self._deadline:
+            raise self.lost("did not return", late=True)
+
+
+def _answer_call(function: Callable[..., Any], arguments: Sequence[Any], commands: int, answers: int) -> None:
+    """Call a function in this process, which has been forked for it, and send its value."""
+    channel = Channel(commands, answers)
+    try:
+        channel.send("answer", (function(*arguments), None))
+    except Exception as error:
+        channel.send("answer", (None, _portable(error)))
 
 
 def pickled(content: Any, reduce: Callable[[SentOnce], tuple[Any, ...]]) -> bytes:

@@ -66,6 +66,7 @@ if TYPE_CHECKING:
     from ._stepping import SteppedRun
     from ._tuning import Tuning, tune
     from ._view import View, view
+    from ._within import within
 
 __all__ = [
     "BuildError",
@@ -115,6 +116,7 @@ __all__ = [
     "uniform",
     "validate",
     "view",
+    "within",
 ]
 
 _MODULES = {
@@ -145,6 +147,7 @@ _MODULES = {
     "yawbench._stepping": ("SteppedRun",),
     "yawbench._tuning": ("Tuning", "tune"),
     "yawbench._view": ("View", "view"),
+    "yawbench._within": ("within",),
 }
 _MODULE_OF = {name: module for module, names in _MODULES.items() for name in names}
 """Public name -> module; the others are registered by wings, see `parts`."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any, Literal
 from yawbench.events.kinds import WarningWatch
 from yawbench.fmus.fmu import Value
 from yawbench.foundation.errors import Diagnostic, ResultsError, ScenarioError
-from yawbench.foundation.messages import hint, short
+from yawbench.foundation.messages import hint, listed, short
+from yawbench.metrics import expressions
 from yawbench.orchestrator.master.fmi import open_instance
 from yawbench.orchestrator.master.run_lifecycle import OpenInstance
 from yawbench.orchestrator.master.simulate import simulate_in_memory
@@ -31,7 +32,7 @@ from yawbench.studies.result_figures import draw_over_axes
 from yawbench.studies.result_files import columns_of
 from yawbench.studies.schema import FigureSpec
 from yawbench.studies.tables import Table, to_latex, to_pandas
-from yawbench.studies.uncertainty import groups_of, sample_columns
+from yawbench.studies.uncertainty import SAMPLE_TABLES, groups_of, sample_columns, sample_tables
 
 from . import arguments
 from ._controller import PythonComponent
@@ -262,6 +263,14 @@ def _in_memory(job: Job, opener: OpenInstance = open_instance) -> Results:
     return simulate_in_memory(job.plan, opener=opener, watch=WarningWatch(job.plan))
 
 
+def _known(argument: str, names: Iterable[str], among: Collection[str]) -> None:
+    """Check that there is what an argument names."""
+    for name in names:
+        if name not in among:
+            guess = hint(name, among, lead="there are")
+            raise ScenarioError(f"{argument}: there is no {short(name)}{guess}", code="argument-invalid")
+
+
 @dataclass(frozen=True)
 class Runs:
     """Results of an experiment.
@@ -308,11 +317,18 @@ class Runs:
     ) -> pd.DataFrame:
         """Return the probability that a metric is within a bound, with its interval (Clopper and Pearson).
 
-        A run without a number, because it failed say, is not within.
+            >>> uncertain = {"friction": yb.uniform(0.4, 0.9)}
+            >>> made = yb.experiment(base, uncertain, metrics="spins(sideslip)", points=8).run()
+            >>> made.probability("spins(sideslip)")[["runs", "meeting"]].values.tolist()
+            [[8, 0]]
 
         Args:
             metric: a column of the table.
-            below, at_most, above, at_least: the bound, in SI or with a unit; exactly one.
+            below, at_most, above, at_least: the bound, in SI or with a unit; exactly one. None for a metric
+                that is 1 where something happens, else 0: the probability that it happens.
+
+        A run without a number, because it failed say, is not within a bound; whether something happens in it
+        is unknown, and it does not count.
 
         Raises:
             ScenarioError: the metric is unknown, or not exactly one bound is given.
@@ -321,35 +337,49 @@ class Runs:
         key = arguments.text(metric, "metric")
         bounds = {"below": below, "at_most": at_most, "above": above, "at_least": at_least}
         given = {name: arguments.scalar(x, name) for name, x in bounds.items() if x is not None}
-        condition = {"metric": key, **given}
-        asked = made(Assertion, says=key, holds_if=[condition])
-        if key not in self._findings.spec.metrics:
-            guess = hint(key, self._findings.spec.metrics, lead="metrics")
-            raise ScenarioError(f"metric: there is no {short(key)}{guess}", code="name-unknown")
+        _known("metric", [key], self._findings.spec.metrics)
         for name, bound in given.items():
             with arguments.as_scenario_errors(f"{name}:"):
                 si_number(bound, self._findings.unit(key))
-        spec = self._findings.spec.model_copy(update={"probabilities": {str(asked.holds_if[0]): asked}})
-        experiment = replace(self._findings.experiment, spec=spec)
-        return replace(self, _findings=replace(self._findings, experiment=experiment))._of_sample(
-            "probabilities"
-        )
+        spec, name, asked = self._findings.spec, key, {}
+        whether = expressions.metric(spec.metrics[key].metric).measure.whether
+        if len(given) > 1 or not (given or whether):
+            which = listed(bounds, last="or")
+            raise ScenarioError(
+                f"give exactly one of {which}, since {key} is a number", code="argument-invalid"
+            )
+        if given:
+            assertion = made(Assertion, says=key, holds_if=[{"metric": key, **given}])
+            name = str(assertion.holds_if[0])
+            asked = {name: assertion}
+        experiment = replace(self._findings.experiment, spec=spec.model_copy(update={"probabilities": asked}))
+        found = replace(self, _findings=replace(self._findings, experiment=experiment))
+        every = found._of_sample("probabilities")
+        return every[every["probability of"] == name].reset_index(drop=True)
 
     def _of_sample(self, name: str) -> pd.DataFrame:
-        if not groups_of(self._findings):
-            raise ResultsError("nothing was drawn: give an axis a distribution", code="results-missing")
-        tables = sample_columns(self._findings, [name])
-        if not tables:
-            raise ResultsError(
-                f"there are no {name}: no listed axis has two levels, or no run has a number",
-                code="results-missing",
-            )
+        if name not in (tables := sample_columns(self._findings, [name])):
+            raise self._lacking(name)
         return to_pandas(tables[name])
 
+    def _lacking(self, name: str) -> ResultsError:
+        """Return the error that says why a table of a sample has no rows."""
+        if not groups_of(self._findings):
+            return ResultsError("nothing was drawn: give an axis a distribution", code="results-missing")
+        why = f"there are no {name}: no listed axis has two levels, or no run has a number"
+        if name == "probabilities":
+            why = f"there are no {name}: no run has a number that is 1 where something happens, else 0"
+        return ResultsError(why, code="results-missing")
+
     def to_latex(
-        self, columns: Iterable[str] | Mapping[str, str] = (), *, caption: str | None = None, label: str = ""
+        self,
+        columns: Iterable[str] | Mapping[str, str] = (),
+        *,
+        of: Literal["runs", "statistics", "probabilities", "differences", "sensitivity"] = "runs",
+        caption: str | None = None,
+        label: str = "",
     ) -> str:
-        """Return a table for LaTeX with a row per run, in displayed units; it needs the package booktabs.
+        """Return a table for LaTeX, in displayed units; it needs the package booktabs.
 
             >>> axes = {"driver.amplitude": [0.02, 0.03]}
             >>> made = yb.experiment(base, axes, metrics=["peak(sideslip)"]).run()
@@ -359,37 +389,56 @@ class Runs:
 
         Args:
             columns: columns of the table, or a mapping of them to headings; default: axes and metrics.
-                Where a run failed, the status is added.
-            caption: above it; default: the title.
-            label: for `\\ref`, such as "tab:runs"; default: none.
+                Where a run failed, the status is added. Of a sample's tables: metrics, or a mapping of them
+                to captions.
+            of: what there are rows of: the runs, or what a sample comes to, with intervals, in a table for
+                each metric.
+            caption: above it; default: the title. Of a sample's tables for one metric alone.
+            label: for `\\ref`, such as "tab:runs"; default: none. Likewise for one metric.
 
         Raises:
             ScenarioError: there is no such column.
+            ResultsError: nothing was drawn.
         """
-        whole, spec = columns_of(self._findings), self._findings.spec
         given = (
             arguments.mapping(columns, "columns", "a mapping of columns to headings")
             if isinstance(columns, Mapping)
             else {name: name for name in arguments.texts(columns, "columns")}
         )
-        headings = dict(given or {name: name for name in (*spec.axes, *spec.metrics)})
+        named = {name: arguments.text(words, "columns") for name, words in given.items()}
+        title = None if caption is None else arguments.text(caption, "caption", empty=True)
+        for_ref = arguments.text(label, "label", empty=True)
+        _known("of", [arguments.text(of, "of")], ("runs", *SAMPLE_TABLES))
+        if of == "runs":
+            return to_latex(self._table_of_runs(named, title), label=for_ref)
+        metrics = self._findings.spec.metrics
+        _known("columns", named, metrics)
+        tables = {
+            key: table for key in named or metrics for table in sample_tables(self._findings, [of], [key])
+        }
+        if not tables:
+            raise self._lacking(of)
+        captions = named if isinstance(columns, Mapping) else {}
+        if len(tables) > 1 and (title is not None or for_ref):
+            which = f"of one metric: name one of {listed(tables)} in columns"
+            raise ScenarioError(f"caption and label are {which}", code="argument-invalid")
+        for key, table in tables.items():
+            table.title = title if title is not None else captions.get(key, table.title)
+        return "\n".join(to_latex(table, label=for_ref) for table in tables.values())
+
+    def _table_of_runs(self, named: Mapping[str, str], title: str | None) -> Table:
+        """Return the table of the runs with the columns of these headings."""
+        whole, spec = columns_of(self._findings), self._findings.spec
+        headings = dict(named or {name: name for name in (*spec.axes, *spec.metrics)})
         if self._findings.failed:
             headings.setdefault("status", "status")
-        if unknown := [name for name in headings if name not in whole.headings]:
-            guess = hint(unknown[0], whole.headings, lead="there are")
-            raise ScenarioError(
-                f"columns: there is no column {short(unknown[0])}{guess}", code="argument-invalid"
-            )
+        _known("columns", headings, whole.headings)
         chosen = [whole.headings.index(name) for name in headings]
-        table = Table(
-            spec.title if caption is None else arguments.text(caption, "caption", empty=True),
-            [
-                replace(whole.columns[k], heading=arguments.text(headings[whole.headings[k]], "columns"))
-                for k in chosen
-            ],
+        return Table(
+            spec.title if title is None else title,
+            [replace(whole.columns[k], heading=headings[whole.headings[k]]) for k in chosen],
             [[row[k] for k in chosen] for row in whole.rows],
         )
-        return to_latex(table, label=arguments.text(label, "label", empty=True))
 
     def to_xarray(self) -> xr.Dataset:
         """Return all columns of all runs over the axes and time; `attrs["units"]` of each has its unit.

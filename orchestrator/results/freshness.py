@@ -13,6 +13,7 @@ from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
 
+from yawbench.fmus.fmu import Fmu
 from yawbench.foundation.cache import OF_RESULTS, sources_hash
 from yawbench.foundation.errors import ResultsError
 
@@ -25,7 +26,7 @@ from .run_record import RUN_FILE, FmuRecord, RunRecord, RunStatus
 def key_of(plan: Plan, also: Any = None) -> str:
     """Return the key of the run that a plan describes; runs with the same key give the same results.
 
-    It is a hash of the content of the FMUs, all parameters and constants, wires, faults, the time grid, the
+    It is a hash of the FMUs (`_made_of`), all parameters and constants, wires, faults, the time grid, the
     algorithm, the recorded columns, the title, and the program's versions and code.
 
     Args:
@@ -36,7 +37,8 @@ def key_of(plan: Plan, also: Any = None) -> str:
         "versions": [*map(version_of, PROGRAMS), sources_hash(OF_RESULTS)],
         "title": plan.title,
         "units": [
-            [u.name, u.fmu.sha256, u.period, u.tolerance, u.parameters, u.constants] for u in plan.instances
+            [u.name, _made_of(u.fmu), u.period, u.tolerance, u.parameters, u.constants]
+            for u in plan.instances
         ],
         "series": [
             [u.name, name, s.sha256, s.column, s.held] for u in plan.instances for name, s in u.series.items()
@@ -49,6 +51,17 @@ def key_of(plan: Plan, also: Any = None) -> str:
         "also": also,
     }
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:32]
+
+
+def _made_of(fmu: Fmu) -> str:
+    """Return a hash of what an FMU computes by: of its sources if it is built of them, else of the archive.
+
+    A component that was built in a hurry runs in Python, and later as native code that was compared with it:
+    its archive is another then, but neither its sources nor its results.
+    """
+    if fmu.built is None or not fmu.built.current:
+        return fmu.sha256
+    return fmu.built.key.partition("-")[0]  # see `BuildStamp.is_unfinished`
 
 
 OF_RUN = (
@@ -85,11 +98,11 @@ def _reason(plan: Plan, recorded: RunRecord) -> str:
             return f"{key.replace('_', ' ')}: changed"
     for instance, fmu in planned.fmus.items():
         known = recorded.fmus.get(instance, FmuRecord())
-        if known.sha256 != fmu.sha256:
-            return f"{instance}: another {fmu.name}.fmu"
-        for key in OF_INSTANCE:
+        for key in OF_INSTANCE if known.name == fmu.name else ():
             if getattr(known, key) != getattr(fmu, key):
                 return f"{instance}: {key.replace('_', ' ')} changed"
+        if known.sha256 != fmu.sha256:
+            return f"{instance}: another {fmu.name}.fmu"
     for program in (*PROGRAMS, "orchestrator"):
         version, earlier = planned.versions[program], recorded.versions.get(program, "an unknown one")
         if version != earlier:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shlex
 import shutil
 import sys
@@ -90,6 +91,20 @@ def test_an_exercise_is_failed_as_it_begins_and_passed_with_a_law(project):
     submission.write_text("raise RuntimeError('no law yet')")
     done = run_in(folder, *mark, submission)
     assert done.returncode == 1 and mentions(done.stdout, "broken.py", "0 of 2", "no law yet")
+    marking, endless, leaving = (
+        folder / "exercises/hold/mark.py",
+        folder / "endless.py",
+        folder / "leaving.py",
+    )
+    marking.write_text(re.sub(r"LIMIT = .*", "LIMIT = 20.0", marking.read_text()))
+    endless.write_text(begun.replace("return 0.0  # your part", "while True: pass"))
+    leaving.write_text("import os; os._exit(0)")
+    done = run_in(folder, *mark, endless, leaving, submission)
+    assert each_mentions(
+        done.stdout, ("endless.py", "0 of 2", "20 s"), ("leaving.py", "0 of 2"), ("no law yet",)
+    )
+    rows = [line.split(",")[:3] for line in marking.with_name("marks.csv").read_text().splitlines()[1:]]
+    assert rows == [[str(one), "0", "fail"] for one in (endless, leaving, submission)]
     assert "hold" in (folder / "exercises/hold/README.md").read_text()
 
 

@@ -105,6 +105,19 @@ def test_the_first_change_is_found_and_none_where_there_is_none():
     assert math.isnan(measures.change_time(T, np.ones_like(T)))
 
 
+def test_a_car_spins_beyond_45_degrees_and_from_straight_back_if_it_reverses():
+    least = math.radians(45)
+    assert [measures.spins(T, x * SINE) for x in (0.99 * least, 1.01 * least)] == [0.0, 1.0]
+    back = math.pi + 0.0 * T
+    assert measures.spins(T, back) == measures.spins(T, 0.99 * least * SINE - back) == 0.0
+    assert measures.spins(T, np.where(T < 1.0, math.pi, 2.0)) == 1.0
+    assert math.isnan(measures.spins(T, np.where(T < 1.0, 0.0, math.nan)))
+    run = results({"plant.sideslip": SINE, "plant.yaw_rate": SINE}, T)
+    assert evaluate(run, metric("spins(sideslip)")).number == 1.0
+    assert evaluate(run, metric("spins(yaw_rate)")) is None
+    assert mentions(why_none(run, metric("spins(yaw_rate)"), None, 2.0), "sideslip")
+
+
 def test_displacement_counts_from_the_first_value_peak_from_zero():
     assert measures.displacement(T, 10 - T) == pytest.approx(2.0)
     assert measures.peak(T, 10 - T) == pytest.approx(10.0)

@@ -84,7 +84,26 @@ def test_show_tells_variables_and_times(alone):
     for line in (("Real_in", "input", "Real"), ("Integer_out", "output", "Integer"), ("answer", "0 to 4")):
         assert mentions(out, *line)
     assert mentions(out, "stop time", "3 s")
-    assert "Wired" not in out
+    assert "Wired by" not in out
+
+
+def test_show_names_the_inputs_that_would_stay_unconnected_and_what_becomes_of_them(
+    library, tmp_path, capsys
+):
+    def shown(name="other.fmu", **change):
+        write_fmu(tmp_path / name, library, "Real", "Boolean", **change)
+        assert status_of("show", tmp_path / name) == 0
+        return capsys.readouterr().out.partition("Wired to nothing")[2].partition("\n\nThey")[0]
+
+    foreign = shown(change=lambda xml: xml.replace('<Real start="0"', '<Real unit="K" start="0.75"'))
+    assert mentions(foreign, "Real_in", "K", "start value, 0.75")
+    assert mentions(foreign, "Boolean_in", "start value")
+    assert not any("Real_out" in line for line in foreign.splitlines())
+    assert mentions(shown("controller_other.fmu"), "Real_in", "refused")
+    resembling = shown(change=lambda xml: xml.replace('"Real_in"', '"YawRateIn"').replace(
+        '<Real start', '<Real unit="rad/s" start'
+    ))  # fmt: skip
+    assert not any("YawRateIn" in line for line in resembling.splitlines())
 
 
 def test_show_says_why_an_fmu_cannot_run_here(library, tmp_path, capsys):

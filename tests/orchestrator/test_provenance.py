@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from datetime import datetime, timezone
 from pathlib import Path
 
@@ -13,6 +14,8 @@ from tests.changed import changed
 from tests.fmu_copies import put_fmus
 from tests.orchestrator.recorded import record_text
 from tests.refusals import mentions
+from yawbench.fmus.build_stamp import BuildStamp
+from yawbench.fmus.fmu import BuildInfo
 from yawbench.orchestrator.plan import CHOSEN, ERRATUM, LITERATURE, NEUTRAL, PAPER, ValueSource
 from yawbench.orchestrator.results.freshness import key_of, staleness
 from yawbench.orchestrator.results.record_of_plan import run_record
@@ -220,40 +223,20 @@ def test_results_of_another_fmu_or_program_are_stale(folder, tmp_path):
 def test_missing_failed_and_damaged_results_are_stale(folder, tmp_path):
     _, plan = planned(folder)
     assert mentions(staleness(plan, tmp_path / "none"), "no results yet")
-    assert mentions(staleness(plan, recorded(plan, tmp_path / "a", status="failed")), "reach", "end")
-    (recorded(plan, tmp_path / "b") / "results.csv").unlink()
-    assert mentions(staleness(plan, tmp_path / "b"), "results")
-    cut = recorded(plan, tmp_path / "c") / "results.csv"
-    cut.write_text("time,x\n0.0,1.0\n0.1,2.")
-    assert mentions(staleness(plan, cut.parent), "results", "cut")
-    (recorded(plan, tmp_path / "d") / "run.json.part").write_text('{"status": "running"}')
-    assert mentions(staleness(plan, tmp_path / "d"), "died")
-    (tmp_path / "b" / "run.json").write_text("{")
-    assert mentions(staleness(plan, tmp_path / "b"), "run.json")
 
 
-def test_a_value_given_by_a_fact_has_the_source_that_stands_beside_the_fact(folder):
-    text = SCENARIO.replace("  friction: 0.7\n", "")
-    text = text.replace("inputs:", "friction: 0.7   # chosen: wet\ninputs:")
-    (folder / "fact.yaml").write_text(text)
-    scenario = load_scenario(folder / "fact.yaml")
-    groups = groups_in(make_plan(scenario, fmus=folder / "fmus"))
-    origin = groups[-1].parameters["reference.friction"].origin
-    assert (origin.kind, origin.says) == (CHOSEN, "chosen: wet")
+def test_results_are_up_to_date_with_another_archive_of_the_same_sources(folder, tmp_path):
+    _, plan = planned(folder)
 
+    def by(archive, key="of the sources", current=True):
+        """Return the plan with another archive of the controller."""
+        built = BuildInfo("components/controllers/fnn.py", key, "a tool", current)
+        one = next(unit for unit in plan.instances if unit.name == "controller")
+        other = replace(one, fmu=replace(one.fmu, sha256=archive, built=built))
+        return replace(plan, instances=tuple(other if unit is one else unit for unit in plan.instances))
 
-def test_the_record_names_file_and_line_of_every_given_value(folder):
-    _, plan = planned(folder, "driver.amplitude=0.1")
-    record = run_record(plan, status="", started=NOW)
-    lines = {file: (folder / file).read_text().splitlines() for file in ("half.yaml", "car.yaml")}
-    for name, fmu in record.fmus.items():
-        assert fmu.sources.keys() == fmu.origins.keys()
-        for parameter, kind in fmu.origins.items():
-            source = record.source(name, parameter)
-            if kind in ("vehicle", "scenario"):
-                line = lines[Path(source.file).name][source.line - 1]
-                assert parameter in line or line.lstrip().startswith(f"{name}:"), (name, parameter)
-            else:
-                assert (source.file, source.line) == ("", 0)
-    assert record.source("driver", "amplitude") == ValueSource("varied", "--set")
-    assert record.source("controller", "learning_rate") is None
+    unfinished = BuildStamp("controller_fnn", "of the sources", "").unfinished().key
+    made = recorded(by("in Python", unfinished), tmp_path)
+    assert staleness(by("native"), made) is None
+    for other in (by("native", key="of other sources"), by("native", current=False)):
+        assert mentions(staleness(other, made), "controller", "controller_fnn.fmu")

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import csv
 import json
-from math import radians
+from math import degrees, radians
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 
@@ -223,6 +224,12 @@ def test_a_small_matrix_is_driven_goes_on_where_it_was_and_shows_what_is_missing
     places = {entry["entry"]: entry["place"] for entry in answer["entries"]}
     assert places == {"fuzzy_pid": 1, "none": 1}
     assert (answer["page"], answer["folder"]) == (str(out / "report.html"), str(out))
+    judged = ("--no-run", "--strict", "--junit", tmp_path / "verdicts.xml")
+    assert status_of("rank", file, "--out", out, *judged) == 1
+    root = ElementTree.parse(tmp_path / "verdicts.xml").getroot()
+    assert (root.get("tests"), root.get("failures"), root.get("errors")) == ("4", "2", "0")
+    slip = float(low["sideslip [rad]"])
+    assert mentions(root.find(".//testcase[@name='low']/failure").get("message"), f"{degrees(slip):.3g}")
 
 
 @pytest.mark.exhaustive

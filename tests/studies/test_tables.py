@@ -10,9 +10,11 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+import yawbench as yb
 from yawbench.figures.latex import escaped
 from yawbench.metrics.expressions import MetricValue
 from yawbench.studies.tables import Column, Table, column, for_terminal, to_csv, to_latex, to_pandas
+from yawbench.studies.uncertainty import SAMPLE_TABLES
 
 
 @pytest.fixture
@@ -80,14 +82,22 @@ ODD = (
 """Everything that a name, a title, a unit or a note may hold."""
 
 
+@pytest.fixture
+def tables_of_a_sample():
+    axes = {"friction": yb.uniform(0.4, 0.9), "controller": ["controller_off", "controller_fnn"]}
+    base, metrics = yb.load("fnn_sideslip/25mps"), ["peak(sideslip)", "spins(sideslip)"]
+    made = yb.experiment(base, axes, metrics=metrics, points=8, design="saltelli").run()
+    return "\n".join(made.to_latex(of=name) for name in SAMPLE_TABLES)
+
+
 @pytest.mark.exhaustive
 @pytest.mark.skipif(not shutil.which("pdflatex"), reason="there is no pdfLaTeX")
-def test_tables_of_every_character_compile_with_booktabs_alone_and_are_readable(tmp_path):
+def test_tables_of_every_character_compile_with_booktabs_alone_and_are_readable(tmp_path, tables_of_a_sample):
     tables = [
         Table(text, ["a", text], [[text, 1.0], [f"{text}\nsecond", None]], [f"note {text}", "two\n\nlines"])
         for text in ODD
     ]
-    body = "\n".join(to_latex(table, label=f"tab:{k}") for k, table in enumerate(tables))
+    body = "\n".join(to_latex(table, label=f"tab:{k}") for k, table in enumerate(tables)) + tables_of_a_sample
     document = rf"\documentclass{{article}}\usepackage{{booktabs}}\begin{{document}}{body}\end{{document}}"
     (tmp_path / "doc.tex").write_text(document, encoding="utf-8")
     command = ["pdflatex", "-interaction=nonstopmode", "-halt-on-error", "doc"]

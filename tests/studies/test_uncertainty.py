@@ -186,6 +186,37 @@ def test_every_law_and_scenario_has_the_same_points_and_differences_are_of_these
     assert len(made.runs[16]) == 41
 
 
+def test_how_probable_a_spin_is_counts_the_runs_that_are_warned_of_it():
+    base = yb.load("fnn_sideslip/25mps").swap(controller="controller_off")
+    steered = {"driver.amplitude": yb.uniform(0.15, 0.4)}
+    metrics = ("spins(sideslip)", "peak(sideslip)")
+    with pytest.warns(yb.YawbenchWarning, match="spins"):
+        made = yb.experiment(base, steered, metrics=metrics, points=8).run(progress=False)
+    warned = [any(one.code == "car-spins" for one in run.diagnostics) for run in made.runs]
+    assert 0 < sum(warned) < len(warned)
+    (row,) = made.probability("spins(sideslip)").to_dict("records")
+    assert (row["runs"], row["meeting"], row["missing"]) == (8, sum(warned), 0)
+    exact = stats.binomtest(sum(warned), 8).proportion_ci(method="exact")
+    assert (row["probability low"], row["probability high"]) == pytest.approx((exact.low, exact.high))
+    mean = made.statistics.set_index("metric").loc["spins(sideslip)"]
+    assert [mean["mean"], mean["mean low"]] == pytest.approx([sum(warned) / 8, exact.low])
+    held = made.probability("spins(sideslip)", at_most=0)
+    assert held["meeting"].tolist() == [8 - sum(warned)]
+    with pytest.raises(ScenarioError) as caught:
+        made.probability("peak(sideslip)")
+    assert mentions(caught.value, "below", "at_most", "above", "at_least")
+
+
+def test_a_run_without_a_number_does_not_count_where_it_is_asked_whether_something_happens(base, monkeypatch):
+    made = yb.experiment(
+        base, {"driver.amplitude": yb.uniform(0.02, 0.03)}, metrics="changes(yaw_rate_ref)", points=4
+    ).run(progress=False)
+    known = uncertainty.numbers_of
+    monkeypatch.setattr(uncertainty, "numbers_of", lambda *of: np.append(known(*of)[:3], np.nan))
+    (row,) = made.probability("changes(yaw_rate_ref)").to_dict("records")
+    assert [row[name] for name in ("runs", "meeting", "missing", "probability")] == [3, 3, 1, 1.0]
+
+
 FILE = """
 title: How sure
 scenario: {dry.yaml: dry, wet.yaml: wet}
@@ -198,6 +229,7 @@ axes:
   control: {vary: controller, values: {controller_off: no control, controller_fuzzy_sideslip: fuzzy}}
 metrics:
   yaw: {metric: peak(yaw_rate_ref)}
+  turned: {metric: changes(yaw_rate_ref), heading: the reference turns}
 probabilities:
   slow: {says: The yaw rate stays below 15 deg/s, holds_if: [{metric: yaw, below: 15 deg/s}]}
 figures:
@@ -230,9 +262,11 @@ def test_a_file_draws_writes_tables_and_figures_and_its_page_shows_the_points(fi
     status, said, _ = yawbench("sweep", path, "--out", tmp_path / "out", "--jobs", 2)
     assert status == 0
     assert mentions(said, "Probability: The yaw rate stays below 15 deg/s")
+    assert mentions(said, "Probability: the reference turns")
     found = yb.open(tmp_path / "out")
     assert {"statistics", "probabilities", "differences", "sensitivity", "table"} <= set(found.tables)
-    assert len(found.tables["statistics"]) == 4
+    assert len(found.tables["statistics"]) == 8
+    assert found.tables["probabilities"]["probability of"].tolist() == ["slow"] * 4 + ["turned"] * 4
     assert found.table["speed"].between(60 / 3.6, 120 / 3.6).all()
     assert {p.name for p in (tmp_path / "out" / "figures").glob("*.svg")} == {
         "share.svg",

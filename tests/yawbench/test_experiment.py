@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import re
 import subprocess
 import sys
 
@@ -190,6 +191,30 @@ def test_a_table_for_latex_has_the_columns_that_are_asked_for_in_displayed_units
     assert lines[7] == rf"controller\_off & {angle:.3g} \ensuremath{{^\circ}} \\"
     with refused(yb.ScenarioError, "argument-invalid", names=("columns", "'peak(sideslip)'")):
         runs.to_latex(["peak(sidesli)"])
+
+
+def test_what_a_sample_comes_to_is_a_table_for_latex_per_metric_with_intervals(base):
+    axes = {"driver.amplitude": yb.uniform(0.02, 0.03), "controller": ["controller_off", "controller_fnn"]}
+    metrics = ["peak(sideslip)", "spins(sideslip)"]
+    made = yb.experiment(base, axes, metrics=metrics, points=8).run()
+    found = made.statistics.set_index(["controller", "metric"]).loc[("controller_off", "peak(sideslip)")]
+    low, mean, high = (np.degrees(found[name]) for name in ("mean low", "mean", "mean high"))
+    text = made.to_latex({"peak(sideslip)": "How far aside"}, of="statistics", label="tab:s")
+    assert r"\caption{How far aside}" in text and r"\label{tab:s}" in text
+    rows = [line for line in text.splitlines() if line.startswith("controller")]
+    assert [row.split(" & ")[0] for row in rows] == ["controller", r"controller\_off", r"controller\_fnn"]
+    shown = [float(part) for part in re.findall(r"\d[-\d.e]*", rows[1].split(" & ")[2])]
+    assert shown == pytest.approx([mean, low, high], rel=0.01)
+    (probability,) = made.probability("spins(sideslip)").to_dict("records")[:1]
+    text = made.to_latex(of="probabilities")
+    assert f"0 (0 to {100 * probability['probability high']:.3g})" in text
+    assert made.to_latex(of="sensitivity").count(r"\begin{table}") == 1  # no car spins: of one metric
+    with refused(yb.ScenarioError, "argument-invalid", names=("label", *metrics)):
+        made.to_latex(of="differences", label="tab:s")
+    with refused(yb.ScenarioError, "argument-invalid", names=("of", "'statistic'", "'statistics'")):
+        made.to_latex(of="statistic")
+    with refused(yb.ResultsError, "results-missing", names=("drawn",)):
+        yb.experiment(base, {"driver.amplitude": [0.02]}, metrics=metrics).run().to_latex(of="statistics")
 
 
 def test_a_table_for_latex_says_which_runs_failed(base):

@@ -367,11 +367,11 @@ def plan_of_scenario(scenario: Path, options: RunOptions, record: Sequence[str] 
     """
     from yawbench.planner import Planner
 
-    from .output import BUILDING, announced
+    from .output import BUILDING, OPENING, announced
 
     planner = Planner(build=options.build)
     loaded = planner.load(scenario, options.changes, validate=not options.no_validate)
-    with announced(BUILDING):
+    with announced(BUILDING if options.build else OPENING):
         return planner.plan(loaded, fmus=options.fmus, isolated=options.isolate, record=record)
 
 
@@ -407,5 +407,12 @@ def executor_of(
     planner = Planner(build=options.build)
     fields = options.of_jobs | of_jobs
     return Executor(
-        folder, identity, runner, planner, options.fresh, fields, each, Terminal(making=not options.no_run)
+        folder,
+        identity,
+        runner,
+        planner,
+        options.fresh,
+        fields,
+        each,
+        Terminal(making=not options.no_run, building=bool(options.build)),
     )

@@ -254,7 +254,8 @@ _LOG = _Log()
 
 PATIENCE = 2.0
 """Time [s] after which a command says what it is at. Chosen: readers of a terminal take more for a hang."""
-BUILDING = "opening the FMUs, and building those that are missing or whose sources have changed: seconds each"
+OPENING = "opening the FMUs"
+BUILDING = f"{OPENING}, and building those that are missing or whose sources have changed: seconds each"
 
 
 @contextlib.contextmanager
@@ -312,12 +313,16 @@ class Terminal:
     """Shows the progress of experiments on stderr, each note once."""
 
     making: bool = True  # whether missing runs are made
+    building: bool = True  # whether FMUs are built
     noted: set[str] = field(default_factory=set)
 
     @contextlib.contextmanager
     def planning(self, total: int) -> Iterator[Callable[[int], None]]:
         """Show a bar, and say if FMUs are what takes long."""
-        with announced(BUILDING), bar("planning", total, quiet=True) as progress:
+        with (
+            announced(BUILDING if self.building else OPENING),
+            bar("planning", total, quiet=True) as progress,
+        ):
             yield progress
 
     def planned(self, planned: PlannedExperiment) -> None:

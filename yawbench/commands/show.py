@@ -171,18 +171,18 @@ def _range(variable: Variable) -> str:
 
 
 def _wiring(fmu: Fmu) -> Iterator[Table]:
-    """Yield what equal names would connect, and what a connection could."""
+    """Yield what equal names would connect, what a connection could, and which inputs nothing here does."""
     from yawbench.orchestrator.wiring.connections import conversion_between
     from yawbench.studies.tables import Table
     from yawbench.vocabulary.signals import SIGNALS
 
     equal: dict[tuple[str, str, str], list[str]] = {}
     near: dict[tuple[str, str], list[str]] = {}
+    alone: dict[tuple[str, str], list[str]] = {}
     for variable in (*fmu.of("input"), *fmu.of("output")):
-        if variable.type not in ("Real", "Integer"):
-            continue
+        number = variable.type in ("Real", "Integer")
         name = _signal(variable.name)
-        if name in SIGNALS:
+        if number and name in SIGNALS:
             scale = conversion_between(_as_signal(variable, name), variable)
             how = "units differ: refused" if scale is None else ""
             if scale not in (None, (1.0, 0.0)):
@@ -190,8 +190,10 @@ def _wiring(fmu: Fmu) -> Iterator[Table]:
             ends = _ends(name, variable.causality)
             if ends:
                 equal.setdefault((variable.causality, ends, how), []).append(variable.name)
-        elif guess := _alike(variable):
+        elif guess := _alike(variable) if number else "":
             near.setdefault((variable.causality, guess), []).append(variable.name)
+        elif variable.causality == "input":
+            alone.setdefault(_unconnected(fmu, variable), []).append(variable.name)
     rows = [(name, *cells) for cells, names in equal.items() for name in fold(names)]
     yield Table("Wired by equal names", ["name", "causality", "to instances of the roles", "remark"], rows)
     others = [(name, *cells) for cells, names in near.items() for name in fold(names)]
@@ -199,6 +201,21 @@ def _wiring(fmu: Fmu) -> Iterator[Table]:
         "Wired by a connection alone", ["name", "causality", "signals that it resembles"], others,
         ["Name one under 'connections' of the scenario if it is meant."],
     )  # fmt: skip
+    yield Table(
+        "Wired to nothing of this bench", ["input", "unit", "without a source"],
+        [(name, *cells) for cells, names in alone.items() for name in fold(names)],
+        ["They resemble no signal: an output of the same name, 'connections' or 'inputs' of the scenario "
+         "reach them."],
+    )  # fmt: skip
+
+
+def _unconnected(fmu: Fmu, variable: Variable) -> tuple[str, str]:
+    """Return the unit of an input, and what becomes of it where it has no source."""
+    from yawbench.vocabulary.roles import role_in
+
+    may = variable.optional or not (fmu.role or role_in(fmu.name))
+    stays = f"stays at its start value, {_text(variable.start)}"
+    return variable.unit or "", stays if may and variable.start is not None else "refused: needs one"
 
 
 def _signal(name: str) -> str:
@@ -238,7 +255,7 @@ def _alike(variable: Variable) -> str:
     shared = {
         name: alike(name, variable.name, SYMBOLS)
         for name in SIGNALS
-        if variable.unit and conversion_between(_as_signal(variable, name), variable) is not None
+        if conversion_between(_as_signal(variable, name), variable) is not None
     }
     most = max(shared.values(), default=0)
     best: Iterable[str] = [name for name, words in shared.items() if words == most > 0]

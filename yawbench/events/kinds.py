@@ -20,6 +20,7 @@ from yawbench.orchestrator.results.reader import Results
 from yawbench.orchestrator.results.record_of_plan import faults_of
 from yawbench.orchestrator.results.run_record import EventRecord
 from yawbench.scene.outline import fed, places_of
+from yawbench.vehicles.motion import SPIN
 from yawbench.vocabulary.gravity import G
 from yawbench.vocabulary.motion import LEAST_SPEED
 from yawbench.vocabulary.wheels import WHEEL_NAMES, wheels
@@ -360,8 +361,8 @@ def _highest_friction(results: Results) -> float | None:
 
 WARNED: tuple[EventKind, ...] = (
     EventKind(
-        "car-spins", "the car spins", _of("sideslip", value=_degrees), 45.0, "deg",
-        "chosen: more than front wheels can be steered against", from_setting_off=True,
+        "car-spins", "the car spins", _of("sideslip", value=_degrees), math.degrees(SPIN), "deg",
+        "chosen: see SPIN", from_setting_off=True,
         warning="the car spins: its sideslip angle passes {limit} degrees at {time} s and reaches "
         "{value} degrees",
     ),

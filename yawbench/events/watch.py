@@ -19,7 +19,7 @@ from yawbench.metrics.expressions import angles_in, motion_of
 from yawbench.metrics.measures import si_of
 from yawbench.orchestrator.results.reader import Results
 from yawbench.orchestrator.results.run_record import EventRecord
-from yawbench.vehicles.motion import standing
+from yawbench.vehicles.motion import BACKWARDS, standing
 
 SignalArrays = Sequence[np.ndarray]
 """The values of an event's signals over a block, in their order; shape (rows,) each."""
@@ -228,7 +228,3 @@ class _State:
         )
         where = Location(signal=column, time=begin)
         return Diagnostic(self.kind.name, message, "warning", where, value)
-
-
-BACKWARDS = math.radians(135.0)
-"""Sideslip beyond which a car that sets off does so backwards [rad]; chosen: nearer to back than to aside."""

@@ -410,7 +410,8 @@ def _unfit(results: Results, chosen: Metric) -> str:
         example = f"{chosen.name.partition('(')[0]}({chosen.signal}, {having[0]})"
         return f"{listed(having)} are recorded: name one of them, as in {example}"
     if chosen.measure.signal:
-        return f"is defined for {chosen.measure.signal}, and needs {listed(chosen.measure.beside)}"
+        beside = chosen.measure.beside
+        return f"is defined for {chosen.measure.signal}{f', and needs {listed(beside)}' if beside else ''}"
     return f"{chosen.signal} has no reference or not the right unit"
 
 
@@ -455,23 +456,23 @@ def _signals(results: Results, chosen: Metric) -> list[list[str]]:
             columns.append(rate)
         if chosen.measure.signal is not None:
             beside = _beside(results, column, chosen.measure)
-            if not beside or chosen.other:
+            if beside is None or chosen.other:
                 return []
             columns += beside
         signals.append(columns)
     return signals
 
 
-def _beside(results: Results, column: str, measure: Measure) -> list[str]:
-    """Return the further columns that a measure takes; none if one is missing."""
+def _beside(results: Results, column: str, measure: Measure) -> list[str] | None:
+    """Return the further columns that a measure takes; None if one is missing, or the signal is another."""
     name, signal = variable_of(column), measure.signal or ""
     if column == _column(results, signal):  # by an input's name, whose column is that of its source
         name = signal
     wheel = name[len(signal) :]
     if not name.startswith(signal) or (wheel and wheel[1:] not in WHEELS):
-        return []
+        return None
     columns = [_column(results, f"{other}{wheel}") for other in measure.beside]
-    return [column for column in columns if column] if all(columns) else []
+    return [column for column in columns if column] if all(columns) else None
 
 
 def _rate_of(results: Results, column: str) -> str | None:

@@ -18,6 +18,7 @@ import numpy as np
 
 from yawbench.orchestrator.scenario.quantities import conversion, measure_of, parse_unit
 from yawbench.orchestrator.signal_names import SignalName
+from yawbench.vehicles.motion import BACKWARDS, SPIN
 from yawbench.vocabulary.signals import SIGNALS
 from yawbench.vocabulary.wheels import WHEEL_NAMES
 
@@ -59,6 +60,7 @@ class Measure:
     takes: tuple[str, ...]
     signal_unit: str | None = None  # the only unit that a signal may have
     of_changes: bool = False  # measures changes over time: an angle goes on where it wraps at 180 degrees
+    whether: bool = False  # 1 if something happens in a run, else 0: of many runs the mean is a share
 
     @property
     def needs_reference(self) -> bool:
@@ -91,12 +93,13 @@ def measure(
     signal_unit: str | None = None,
     name: str = "",
     of_changes: bool = False,
+    whether: bool = False,
 ) -> Callable[[F], F]:
     """Return a decorator that registers a function in the table, by default under its own name."""
 
     def enter(function: F) -> F:
         takes = tuple(inspect.signature(function).parameters)[1:]
-        row = Measure(function, formula, definition, unit, takes, signal_unit, of_changes)
+        row = Measure(function, formula, definition, unit, takes, signal_unit, of_changes, whether)
         MEASURES[name or function.__name__] = row
         return function
 
@@ -185,9 +188,23 @@ def displacement(t: np.ndarray, x: np.ndarray) -> float:
     return peak(t, x - x[0])
 
 
-@measure("1 if {x} ≠ {x}(0) ever, else 0", "whether it ever leaves its first value", "%")
+@measure("1 if {x} ≠ {x}(0) ever, else 0", "whether it ever leaves its first value", "%", whether=True)
 def changes(t: np.ndarray, x: np.ndarray) -> float:
-    return float(np.any(x != x[0]))  # 0 or 1, so that the mean over repeats is a fraction
+    return float(np.any(x != x[0]))
+
+
+@measure(
+    f"1 if max|β| > {math.degrees(SPIN):g}°, else 0",
+    "whether the car spins: as the event `car-spins`, from straight back if it begins to move backwards",
+    "%",
+    whether=True,
+)
+def spins(t: np.ndarray, sideslip: np.ndarray) -> float:
+    backwards = abs(sideslip[0]) > BACKWARDS
+    aside = np.pi - np.abs(sideslip) if backwards else np.abs(sideslip)
+    if np.any(aside > SPIN):
+        return 1.0
+    return math.nan if np.isnan(aside).any() else 0.0
 
 
 @measure("t: {x} ≠ {x}(0) for the first time", "time until it leaves its first value", "s")

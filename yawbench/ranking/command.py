@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -124,7 +125,11 @@ def _pass_on(scores: Iterable[EntryScore]) -> None:
                 broken_off(score.spec.title, [(cell.condition, counted(cell.missing, "missing run"))])
                 continue
             status = Status.PASSED if cell.passed else Status.FAILED
-            judged(score.spec.title, [(cell.condition, Verdict(status, why=cell.state.value))])
+            passed, number = cell.counts
+            why = f"{passed} of {counted(number, 'run')} passed"
+            if (slip := cell.worst["sideslip"]) is not None:
+                why += f", the worst with {math.degrees(slip):.3g} degrees of sideslip"
+            judged(score.spec.title, [(cell.condition, Verdict(status, why=why))])
 
 
 def _check(option: str, what: str, names: Sequence[str], known: Mapping[str, Any]) -> None:

@@ -34,7 +34,7 @@ table 2 (b) and (f). A. B. Owen, Monte Carlo variance of scrambled net quadratur
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, TypeVar
 
@@ -44,7 +44,6 @@ from yawbench.metrics.expressions import MetricValue, metric
 from yawbench.metrics.measures import si
 
 from .axes import RUN, Level
-from .claim_schema import Assertion
 from .claims import judge
 from .confidence import TAIL, ConfidenceInterval, interval, jackknife, share_bounds
 from .experiment import Case, NamedRun
@@ -214,17 +213,39 @@ def sobol_indices(a: np.ndarray, b: np.ndarray, mixed: np.ndarray) -> SobolIndic
 # ---- tables ----
 
 
-def sample_tables(findings: ExperimentResult) -> list[Table]:
-    """Return the tables of a sample for people: statistics, probabilities, differences, sensitivities."""
+SAMPLE_TABLES = ("statistics", "probabilities", "differences", "sensitivity")
+"""The names of a sample's tables."""
+
+
+def sample_tables(
+    findings: ExperimentResult, names: Iterable[str] = SAMPLE_TABLES, keys: Iterable[str] = ()
+) -> list[Table]:
+    """Return the tables of a sample for people, one per metric and name.
+
+    Args:
+        findings: of the experiment.
+        names: of the tables. Statistics leave out metrics that are 0 or 1, which have probabilities.
+        keys: of metrics and probabilities; default: all.
+    """
     groups = groups_of(findings)
     if not groups:
         return []
-    tables = [_shown_statistics(findings, groups, key) for key in findings.spec.metrics]
-    tables += [_shown_probability(findings, groups, name) for name in findings.spec.probabilities]
+    metrics = [*findings.spec.metrics]
+    only = [*keys] or [*metrics, *findings.spec.probabilities]
     differences = differences_of(findings, groups)
-    for key in findings.spec.metrics if differences else ():
-        tables.append(_shown_differences(findings, differences, key))
-    tables += [_shown_sensitivities(findings, groups, key) for key in findings.spec.metrics]
+    of = {
+        "statistics": [key for key in metrics if not _whether(findings, key)],
+        "probabilities": asked(findings),
+        "differences": metrics if differences else [],
+        "sensitivity": metrics,
+    }
+    shown: dict[str, Callable[[str], Table]] = {
+        "statistics": lambda key: _shown_statistics(findings, groups, key),
+        "probabilities": lambda key: _shown_probability(findings, groups, key),
+        "differences": lambda key: _shown_differences(findings, differences, key),
+        "sensitivity": lambda key: _shown_sensitivities(findings, groups, key),
+    }
+    tables = [shown[name](key) for name in names for key in of[name] if key in only]
     return [table for table in tables if table.rows]
 
 
@@ -326,6 +347,10 @@ def _statistics(findings: ExperimentResult, groups: Sequence[Group]) -> Table:
             "missing", "int64", [len(all_) - len(some) for all_, some in zip(every, numbers, strict=True)]
         ),
     ]
+    means = [
+        probability(int(some.sum()), len(some)) if _whether(findings, key) and len(some) else mean(some)
+        for (_, key), some in zip(rows, numbers, strict=True)
+    ]
     percentiles = [
         part
         for p in PERCENTILES
@@ -336,18 +361,35 @@ def _statistics(findings: ExperimentResult, groups: Sequence[Group]) -> Table:
         rows,
         [
             *counts,
-            *_estimated("mean", [mean(some) for some in numbers]),
+            *_estimated("mean", means),
             *_estimated("deviation", [deviation(some) for some in numbers]),
             *percentiles,
         ],
     )
 
 
-def holding(findings: ExperimentResult, group: Group, assertion: Assertion) -> tuple[int, int, int]:
-    """Return how many of a group's runs meet all conditions, how many have none, and how many there are.
+def asked(findings: ExperimentResult) -> list[str]:
+    """Return the names of what a sample tells the probability of: conditions, and metrics that are 0 or 1."""
+    spec = findings.spec
+    return [*dict.fromkeys((*spec.probabilities, *(key for key in spec.metrics if _whether(findings, key))))]
 
-    A run without a number, because it failed say, does not meet them.
+
+def _whether(findings: ExperimentResult, key: str) -> bool:
+    """Return whether a metric is 0 or 1 in each run."""
+    return metric(findings.spec.metrics[key].metric).measure.whether
+
+
+def holding(findings: ExperimentResult, group: Group, name: str) -> tuple[int, int, int]:
+    """Return in how many of a group's runs something holds, how many have no number, and how many count.
+
+    A run without a number, because it failed say, does not meet conditions; whether something happens in it
+    is unknown, and it does not count.
     """
+    assertion = findings.spec.probabilities.get(name)
+    if assertion is None:
+        numbers = independent(findings, numbers_of(findings, group, name))
+        known = numbers[np.isfinite(numbers)]
+        return int(known.sum()), len(numbers) - len(known), len(known)
     cases = independent(findings, group.cases)
     labels = {group.run.name: group.run.row}
     verdicts = [
@@ -364,23 +406,26 @@ def _probability_rows(
     rows = []
     for name in names:
         for group in groups:
-            count, missing, number = holding(findings, group, findings.spec.probabilities[name])
-            rows.append((group, name, count, missing, number, probability(count, number)))
+            count, missing, number = holding(findings, group, name)
+            if number:
+                rows.append((group, name, count, missing, number, probability(count, number)))
     return rows
 
 
 def _shown_probability(findings: ExperimentResult, groups: Sequence[Group], name: str) -> Table:
-    says = findings.spec.probabilities[name].says.rstrip(".")
+    assertion = findings.spec.probabilities.get(name)
+    says = assertion.says.rstrip(".") if assertion else _heading(findings, name)
     table = Table(f"Probability: {says}", [*_names(findings), "runs", "probability"])
     for group, _, count, missing, number, estimate in _probability_rows(findings, groups, [name]):
         table.rows.append([*group.words, f"{count} of {number}", _with_bounds(estimate, "%")])
         if missing:
-            table.notes = ["a run without a number counts as one that does not meet the conditions"]
+            without = "counts as one that does not meet the conditions" if assertion else "does not count"
+            table.notes = [f"a run without a number {without}"]
     return table
 
 
 def _probabilities(findings: ExperimentResult, groups: Sequence[Group]) -> Table:
-    rows = _probability_rows(findings, groups, findings.spec.probabilities)
+    rows = _probability_rows(findings, groups, asked(findings))
     names = _names(findings)
     words = [group.words for group, *_ in rows]
     return Table.of_columns(

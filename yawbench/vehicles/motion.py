@@ -1,12 +1,18 @@
-"""Whether a car moves fast enough for the angles of its velocity (see `vocabulary.motion`)."""
+"""How a car moves: fast enough for the angles of its velocity (`vocabulary.motion`), backwards, in a spin."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
 
 from yawbench.vocabulary.motion import LEAST_SPEED
+
+SPIN = math.radians(45.0)
+"""Sideslip beyond which a car spins [rad]. Chosen: more than front wheels can be steered against."""
+BACKWARDS = math.radians(135.0)
+"""Sideslip beyond which a car that sets off does so backwards [rad]; chosen: nearer to back than to aside."""
 
 
 def standing(signals: Mapping[str, np.ndarray]) -> np.ndarray | None:
