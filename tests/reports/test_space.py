@@ -44,7 +44,7 @@ def page(runs, tmp_path_factory):
 
 
 def opened(chromium, page, **state):
-    chromium.open(page, "run?" + "&".join(f"{k}={quote(json.dumps(v))}" for k, v in state.items()))
+    chromium.open(page, "run?" + "&".join(f"{k}={quote(json.dumps(v))}" for k, v in state.items()), width=700)
     chromium.wait_for("document.querySelector('.yv-ready')")
 
 

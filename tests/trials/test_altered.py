@@ -28,8 +28,8 @@ def test_altered_values_are_computed_with_or_answered_in_a_sentence(group: str, 
     assert sum(counts.values()) == 3
 
 
+@pytest.mark.exhaustive  # tests/orchestrator/test_recorder.py and test_formats.py fill disks
 @pytest.mark.parametrize("command", COMMANDS)
-@pytest.mark.sampled(1)
 def test_a_command_on_a_full_disk_fails_in_a_sentence_and_the_next_call_gives_all(
     command: str, tmp_path: Path
 ) -> None:
