@@ -10,10 +10,10 @@ from pathlib import Path
 import pytest
 
 from tests.cars import load_scenario, make_plan
+from tests.command_line import status_of
 from tests.fmus.fake_fmus import Var, make_fmu
 from tests.refusals import each_mentions, mentions, refused, texts_of, told
 from tests.reports.made_up import unpacked
-from yawbench.cli import main
 from yawbench.commands.check import show
 from yawbench.commands.output import print_tables, say
 from yawbench.fmus import zip_members
@@ -281,8 +281,7 @@ def test_what_an_escape_sequence_would_do_never_reaches_the_terminal(
     Path("a.yaml").write_text(f"{HEAD}units: {{a: {{fmu: plant}}}}\n")
     plan = make_plan(load_scenario(Path("a.yaml")))
     show(replace(plan, title=ESCAPES), Path(f"{ESCAPES}.yaml"))
-    with pytest.raises(SystemExit):
-        main(["check", f"{ESCAPES}.yaml"])
+    status_of("check", f"{ESCAPES}.yaml")
     out, err = capsys.readouterr()
     assert out.count("\\x1b[31mred") == 6
     assert err.count("\\x1b[31mred") == 2

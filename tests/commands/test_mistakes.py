@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from tests.checkout import ROOT
+from tests.command_line import status_of
 from tests.refusals import mentions
-from yawbench.cli import main
 
 NAME = "fuzzy_feedback/single_sine"
 FILE = str(ROOT / f"scenarios/{NAME}.yaml")
@@ -21,9 +21,7 @@ def said(tmp_path, monkeypatch, capsys):
     monkeypatch.setenv("COLUMNS", "200")
 
     def say(*arguments):
-        with pytest.raises(SystemExit) as ended:
-            main(list(arguments))
-        return ended.value.code, capsys.readouterr().err
+        return status_of(*arguments), capsys.readouterr().err
 
     return say
 

@@ -12,9 +12,9 @@ import pytest
 
 from tests.cars import make_plan
 from tests.changed import changed
+from tests.command_line import status_of
 from tests.conftest import build_here
 from tests.refusals import mentions
-from yawbench.cli import main
 from yawbench.commands.new import begin
 from yawbench.foundation.errors import SimulationError
 from yawbench.orchestrator.master.isolation import Isolation
@@ -62,9 +62,7 @@ def run(fmus, tmp_path, capsys):
         out = tmp_path / "out"
         options = ["--fmus", str(fmus), "--no-build", "--out", str(out), "--set", "stop_time=0.1"]
         options += ["--swap", f"controller={controller}", *arguments, *(["--isolate"] if isolate else [])]
-        with pytest.raises(SystemExit) as exit_:
-            main(["run", str(CAR), *options])
-        return exit_.value.code, capsys.readouterr().err, load_results(out)
+        return status_of("run", CAR, *options), capsys.readouterr().err, load_results(out)
 
     return go
 
@@ -217,7 +215,5 @@ def test_a_failure_in_an_isolated_unit_is_the_sentence_of_one_that_is_not(fmus, 
     [("0 s", "--call-limit"), ("0", "(got 0)"), ("soon", "--call-limit")],
 )
 def test_a_limit_that_is_no_time_is_refused(option, says, capsys):
-    with pytest.raises(SystemExit) as exit_:
-        main(["run", str(CAR), "--isolate", "--call-limit", option])
-    assert exit_.value.code == 2
+    assert status_of("run", CAR, "--isolate", "--call-limit", option) == 2
     assert says in capsys.readouterr().err

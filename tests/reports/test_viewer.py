@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 from tests.checkout import ROOT
+from tests.command_line import status_of
 from tests.orchestrator.recorded import car, noted, write
 from tests.refusals import each_mentions, mentions
 from tests.reports.browser import DESK, PHONE, Browser
 from tests.reports.flaws import inaccessible, looks, size_without_samples
 from tests.reports.made_up import MU, SIZES, data_in, head_of, unpacked, whole_car, without
-from yawbench.cli import main
 from yawbench.components.driving.track import LaneChangeParameters, Track
 from yawbench.figures.display import digits_of, shown_unit
 from yawbench.figures.panels import LabelledRun
@@ -197,9 +197,7 @@ def yawbench(capsys):
     """Call the command line and return its exit status and its messages."""
 
     def call(*arguments):
-        with pytest.raises(SystemExit) as ended:
-            main(list(arguments))
-        return ended.value.code, capsys.readouterr().err
+        return status_of(*arguments), capsys.readouterr().err
 
     return call
 

@@ -16,10 +16,10 @@ import numpy as np
 import pytest
 
 import yawbench as yb
+from tests.command_line import status_of
 from tests.refusals import mentions, refused, texts_of
 from tests.reports.made_up import unpacked
 from yawbench._controller import PythonComponent
-from yawbench.cli import main
 from yawbench.components.controllers.fnn import Fnn
 from yawbench.foundation.errors import warnings_in
 
@@ -74,9 +74,7 @@ def test_every_public_name_is_there():
 
 def test_a_run_has_the_numbers_that_the_command_line_writes(base, run, tmp_path):
     main_path = str(base.path)
-    with pytest.raises(SystemExit) as end:
-        main(["run", main_path, "--set", "stop_time=1.6", "--out", str(tmp_path / "cli")])
-    assert end.value.code == 0
+    assert status_of("run", main_path, "--set", "stop_time=1.6", "--out", tmp_path / "cli") == 0
     assert equal(run, yb.open(tmp_path / "cli"))
 
 
@@ -658,18 +656,11 @@ def test_what_a_run_cannot_be_evaluated_with_is_said_in_a_sentence(run, test, an
             ("vehicle.mass", "number"),
         ),
         (lambda base, run: base.run(progress=3), TypeError, ("progress", "function", "total")),
-        (lambda base, run: run[0], TypeError, ("column", "text")),
-        (lambda base, run: run.metric(3), TypeError, ("metric", "text")),
         (lambda base, run: run.metric("peak(sideslip)", (1,)), TypeError, ("window", "pair", "times")),
         (
             lambda base, run: run.metric("peak(sideslip)", ("0", "1")),
             TypeError,
             ("0", "number", "window"),
-        ),
-        (
-            lambda base, run: run.plot("yawrate"),
-            yb.ScenarioError,
-            ("panel yawrate:", "'yaw_rate'"),
         ),
         (
             lambda base, run: base.set({"stop_time": 1e9, "step_size": 1e-9}),
@@ -682,24 +673,9 @@ def test_what_a_run_cannot_be_evaluated_with_is_said_in_a_sentence(run, test, an
             ("16 GB", "kept", "memory"),
         ),
         (
-            lambda base, run: base.set({"plant.mas": 1200}),
-            yb.ScenarioError,
-            ("set plant.mas=1200", "'mass'"),
-        ),
-        (
             lambda base, run: base.set({"vehicle.mass": "3 m", "driver.amplitude": "1 kg"}),
             yb.ScenarioError,
             ("set driver.amplitude=1 kg", "deg"),
-        ),
-        (
-            lambda base, run: base.set({"inputs.friktion*": 0.3}),
-            yb.ScenarioError,
-            ("set inputs.friktion*=0.3", "'friction_*'"),
-        ),
-        (
-            lambda base, run: base.swap(controller="controller_nowhere"),
-            yb.ModelDescriptionError,
-            ("controller_nowhere",),
         ),
         (
             lambda base, run: base.swap(controller=lambda yawrate: 0.0),
