@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from tests.checkout import copy_checkout, run_in
+from tests.fmu_copies import put_fmus
 from tests.refusals import each_mentions, mentions
 from yawbench.cli import main
-from yawbench.fmus.build import build_all
 from yawbench.orchestrator.results.reader import load_results
 from yawbench.orchestrator.scenario import catalogue
 from yawbench.orchestrator.scenario.loader import load_scenario
@@ -60,7 +60,7 @@ def project(tmp_path_factory):
     assert everything[1] == "build"
     assert everything[-2:] == ["--out", "fmus"]
     assert {*everything[2:-2]} == {*UNITS} - {"controller_fnn", "controller_fuzzy_sideslip"}
-    build_all(folder / "fmus", components=UNITS)  # quicker than everything
+    put_fmus(folder / "fmus", components=UNITS)  # quicker than building everything
     for command in (*of_python, *printed["follow_c"][1:-1]):
         done = run_in(folder, *command)
         assert done.returncode == 0, done.stdout + done.stderr

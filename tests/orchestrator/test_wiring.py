@@ -225,18 +225,11 @@ def test_without_a_folder_of_fmus_those_of_the_project_are_used(
 
 def test_every_missing_fmu_is_said_with_those_there_are(folder: Path) -> None:
     path = scenario(UNITS.replace("controller_fnn", "controller_fn").replace("tyre_dugoff", "x/tyre.fmu"))
-    assert each_mentions(
+    assert told(
         problems(path, ModelDescriptionError),
-        (
-            "a.yaml:5",
-            "units.controller.fmu",
-            "'controller_fn'",
-            "fmus",
-            "'controller_fnn'",
-            "controller_dead_band",
-            "controller_sliding_mode",
-        ),
-        ("a.yaml:7", "units.tyre.fmu", "tyre.fmu"),
+        "fmu-missing | a.yaml:5: units.controller.fmu | 'controller_fn' | fmus | 'controller_fnn'"
+        " | controller_dead_band | controller_sliding_mode\n"
+        "fmu-missing | a.yaml:7: units.tyre.fmu | tyre.fmu",
     )
     assert each_mentions(
         problems(scenario(), ModelDescriptionError, swaps=["tyre=tyre_x"]),
@@ -485,24 +478,12 @@ def test_an_optional_input_keeps_its_start_value_where_nothing_drives_it(folder:
 
 def test_more_than_one_output_of_a_name_is_said_and_a_connection_settles_it() -> None:
     units = UNITS + "  second: {fmu: driver_sine}\n"
-    assert each_mentions(
+    assert told(
         problems(scenario(units)),
-        (
-            "a.yaml:5",
-            "units.controller",
-            "controller.steer_angle",
-            "driver.steer_angle",
-            "second.steer_angle",
-            "'connections'",
-        ),
-        (
-            "a.yaml:6",
-            "units.plant",
-            "plant.steer_angle",
-            "driver.steer_angle",
-            "second.steer_angle",
-            "'connections'",
-        ),
+        "input-ambiguous | a.yaml:5: units.controller | controller.steer_angle | driver.steer_angle"
+        " | second.steer_angle | 'connections'\n"
+        "input-ambiguous | a.yaml:6: units.plant | plant.steer_angle | driver.steer_angle"
+        " | second.steer_angle | 'connections'",
     )
     more = "  - {from: second.steer_angle, to: plant.steer_angle}\n"
     more += "  - {from: driver.steer_angle, to: controller.steer_angle}\n"
@@ -565,15 +546,10 @@ def test_a_wrong_connection_is_said_in_one_sentence(connection: str, lines: str)
 
 def test_two_connections_to_one_input_are_said() -> None:
     more = "  - {from: controller.torque_request_rr, to: plant.wheel_torque_fl}\n"
-    assert each_mentions(
+    assert told(
         problems(scenario(rest=CONSTANTS + TORQUES + more)),
-        (
-            "a.yaml:11",
-            "connections[1]",
-            "plant.wheel_torque_fl",
-            "controller.torque_request_fl",
-            "connections[0]",
-        ),
+        "input-ambiguous | a.yaml:11: connections[1] | plant.wheel_torque_fl"
+        " | controller.torque_request_fl | connections[0]",
     )
 
 
@@ -758,16 +734,10 @@ def test_a_real_algebraic_loop_is_said_with_its_path(folder: Path) -> None:
         ],
     )
     path = scenario(UNITS.replace("plant_seven_dof", "plant_loop"), CONSTANTS)
-    assert each_mentions(
+    assert told(
         problems(path),
-        (
-            "a.yaml",
-            "tyre.tyre_force_y_fl",
-            "plant.tyre_force_y_fl",
-            "plant.slip_angle_fl",
-            "tyre.slip_angle_fl",
-            "'delay: 1 step'",
-        ),
+        "algebraic-loop | a.yaml | tyre.tyre_force_y_fl | plant.tyre_force_y_fl | plant.slip_angle_fl"
+        " | tyre.slip_angle_fl | 'delay: 1 step'",
     )
 
 
@@ -918,17 +888,10 @@ def test_null_leaves_an_input_without_a_source(folder: Path) -> None:
     units = estimators(folder).replace("  road: {fmu: road}\n", "")
     refused = TORQUES + "  - {from: null, to: tyre.friction_*}\n"
     refused += "  - {from: [plant], to: [controller]}\n"
-    assert each_mentions(
+    assert told(
         problems(scenario(units, refused)),
-        (
-            "a.yaml:7",
-            "units.tyre",
-            "tyre.friction_*",
-            "1",
-            "estimator.friction_*",
-            "estimator.friction",
-            "'inputs'",
-        ),
+        "input-undriven | a.yaml:7: units.tyre | tyre.friction_* | 1 | estimator.friction_*"
+        " | estimator.friction | 'inputs'",
     )
     made = plan(scenario(units, 'inputs: {"friction_*": 0.3}\n' + refused))
     assert [unit(made, "tyre").constants[f"friction_{w}"] for w in WHEELS] == [0.3] * 4
@@ -999,19 +962,11 @@ def test_recorded_outputs_are_in_the_order_of_the_list_each_once() -> None:
 
 def test_a_record_of_nothing_is_said() -> None:
     rest = CONSTANTS + TORQUES + 'record: [plant.yawrate, "*.beta"]\n'
-    assert each_mentions(
+    assert told(
         problems(scenario(rest=rest)),
-        ("a.yaml:11", "record[0]", "'yawrate'", "'yaw_rate'", "plant"),
-        (
-            "a.yaml:11",
-            "record[1]",
-            "'beta'",
-            "steer_angle",
-            "torque_request_*",
-            "yaw_rate",
-            "acceleration_y",
-            "slip_angle_*",
-        ),
+        "variable-unknown | a.yaml:11: record[0] | 'yawrate' | 'yaw_rate' | plant\n"
+        "variable-unknown | a.yaml:11: record[1] | 'beta' | steer_angle | torque_request_* | yaw_rate"
+        " | acceleration_y | slip_angle_*",
     )
 
 

@@ -601,7 +601,7 @@ def test_what_cannot_stand_for_a_controller_is_refused_in_a_sentence(base, given
         base.swap(controller=given)
 
 
-def test_unknown_units_places_and_scenarios_are_refused_with_a_guess(base):
+def test_unknown_units_and_places_are_refused_with_a_guess(base):
     with refused(yb.ScenarioError, "instance-unknown", names=("'controler'", "'controller'")) as caught:
         base.swap(controler="controller_off")
     assert (caught.value.file, caught.value.line) == (base.path, None)
@@ -609,8 +609,6 @@ def test_unknown_units_places_and_scenarios_are_refused_with_a_guess(base):
         yb.YawbenchError, "parameter-unknown", names=("plant.mas=3", "plant_seven_dof", "'mas'", "'mass'")
     ):
         base.set({"plant.mas": 3}).plan()
-    with refused(yb.ScenarioError, "scenario-unknown", names=("'fnn_sideslip/25mp'", "'fnn_sideslip/25mps'")):
-        yb.load("fnn_sideslip/25mp")
 
 
 def test_an_output_of_the_wrong_length_ends_the_run_with_a_sentence(base):
