@@ -18,6 +18,7 @@ import pytest
 
 from tests.command_line import status_of
 from tests.fmu_copies import put_fmus
+from tests.fmus import models3
 from tests.reports import browser as browsers
 from yawbench.fmus import recipe
 from yawbench.fmus.build import build_component
@@ -140,6 +141,14 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def bare_library(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The same without the functions that many FMUs leave out, those for texts among them."""
     return compiled(FMUS / "foreign.c", tmp_path_factory.mktemp("bare") / "foreign.so", "-DBARE")
+
+
+@pytest.fixture(scope="session")
+def models(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The compiled library of all models of FMI 3."""
+    folder = tmp_path_factory.mktemp("models3")
+    (folder / "stubs.h").write_text(models3.stubs(), encoding="utf-8")
+    return compiled(models3.HERE / "models3.c", folder / "models3.so", f"-I{folder}")
 
 
 def compiled(source: Path, target: Path, *options: str) -> Path:

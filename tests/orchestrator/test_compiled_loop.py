@@ -18,7 +18,6 @@ import yawbench as yb
 from tests.cars import load_scenario, make_plan
 from tests.command_line import status_of
 from tests.commands.test_run import FAULTY, PAIR
-from tests.conftest import compiled
 from tests.fmus import models3
 from tests.fmus.models3 import make_fmu
 from tests.orchestrator.test_foreign import write_fmu
@@ -161,12 +160,9 @@ def test_rows_that_are_not_equally_spaced_are_refused():
             loop.lay(range(1, 4), rows, 1, {0: []})
 
 
-def test_instances_of_fmi_3_give_the_same_bytes(both, tmp_path, tmp_path_factory):
-    folder = tmp_path_factory.mktemp("models3")
-    (folder / "stubs.h").write_text(models3.stubs(), encoding="utf-8")
-    library = compiled(models3.HERE / "models3.c", folder / "models3.so", f"-I{folder}")
-    models = ("Dahlquist", "VanDerPol", "BouncingBall", "Stair", "Early", "Every")
-    units = {model: {"fmu": str(make_fmu(tmp_path, model, library))} for model in models}
+def test_instances_of_fmi_3_give_the_same_bytes(both, models, tmp_path):
+    names = ("Dahlquist", "VanDerPol", "BouncingBall", "Stair", "Early", "Every")
+    units = {name: {"fmu": str(make_fmu(tmp_path, name, models))} for name in names}
     constants = {f"Every.{v}_in": 1 for v in models3.TYPES if v not in ("Float64", "Float32", "Boolean")}
     constants |= {"Every.Boolean_in": True, "Every.String_in": "a", "Every.mode_in": "wet"}
     wires = [
