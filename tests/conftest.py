@@ -27,6 +27,8 @@ from yawbench.foundation.workers import default_workers
 TESTS = Path(__file__).parent
 FMUS = TESTS / "fmus"
 """Folder of FMUs and components in C that are made for tests."""
+STEP = "if (fabs(law(s, v)) < v->moment_limit)"
+"""Line at which a new controller in C is given something to do that it should not."""
 LONGEST_FIRST = (
     *("scenarios", "trials", "studies", "ranking", "reports", "bench", "docs", "orchestrator", "commands"),
     *("interop", "measured_cars", "yawbench", "fmus"),
@@ -124,11 +126,26 @@ def common_cache(unpacked: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("YAWBENCH_CACHE", str(unpacked))
 
 
-def build_here(source: Path, folder: Path) -> Path:
-    """Build a component in C without its library for Windows, which takes as long as that for Linux."""
+def build_controller_in_c(folder: Path, act: str, name: str = "idea") -> Path:
+    """Build the controller in C that `yawbench new` begins with; first of all it does `act` in every step.
+
+    Without its library for Windows, which takes as long as that for Linux.
+    """
+    from yawbench.commands.new import begin
+
+    for path, text in begin("controller", name, "c", in_checkout=True).files.items():
+        file = folder / path
+        file.parent.mkdir(parents=True, exist_ok=True)
+        if file.suffix == ".c":
+            assert STEP in text
+            headers = "".join(
+                f"#include <{header}.h>\n" for header in ("signal", "stdio", "stdlib", "unistd")
+            )
+            text = headers + text.replace(STEP, f"{act}\n    {STEP}")
+        file.write_text(text)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(recipe, "MINGW", "no-compiler-for-windows")
-        return build_component(source, folder)
+        return build_component(folder / "components" / "controllers" / name, folder / "built")
 
 
 @pytest.fixture(scope="session")

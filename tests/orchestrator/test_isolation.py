@@ -13,9 +13,8 @@ import pytest
 from tests.cars import make_plan
 from tests.changed import changed
 from tests.command_line import status_of
-from tests.conftest import build_here
+from tests.conftest import build_controller_in_c
 from tests.refusals import mentions
-from yawbench.commands.new import begin
 from yawbench.foundation.errors import SimulationError
 from yawbench.orchestrator.master.isolation import Isolation
 from yawbench.orchestrator.master.simulate import simulate
@@ -28,9 +27,6 @@ UNITS = (
     "driver_sine", "reference_steady_state", "controller_fnn", "allocator_load_proportional",
     "wheel_control_direct", "plant_seven_dof", "tyre_dugoff",
 )  # fmt: skip
-STEP = "if (fabs(law(s, v)) < v->moment_limit)"
-"""Line at which the controller in C is given something to do that it should not."""
-
 needs_cc = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler")
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="--isolate needs Linux or macOS")
 
@@ -40,16 +36,7 @@ def foreign(tmp_path):
     """Build a controller in C that does `act` from t = 0.05 s on; return its path."""
 
     def build(act):
-        for path, text in begin("controller", "idea", "c", in_checkout=True).files.items():
-            file = tmp_path / path
-            file.parent.mkdir(parents=True, exist_ok=True)
-            if file.name == "idea.c":
-                assert STEP in text
-                text = text.replace(STEP, f"if (t > 0.0495) {{ {act} }}\n    {STEP}")
-                headers = ("signal", "stdio", "stdlib", "unistd")
-                text = "".join(f"#include <{name}.h>\n" for name in headers) + text
-            file.write_text(text)
-        return build_here(tmp_path / "components" / "controllers" / "idea", tmp_path / "built")
+        return build_controller_in_c(tmp_path, f"if (t > 0.0495) {{ {act} }}")
 
     return build
 

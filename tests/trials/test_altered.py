@@ -20,8 +20,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Folder]:
     yield base(tmp_path_factory.mktemp("altered") / "base")
 
 
+@pytest.mark.exhaustive  # tests/commands/test_hostile_files.py and orchestrator/test_one_car.py alter files
 @pytest.mark.parametrize("group", GROUPS)
-@pytest.mark.sampled(1)
 def test_altered_values_are_computed_with_or_answered_in_a_sentence(group: str, folder: Folder) -> None:
     counts, notes = trial(group, [0, 1, 2], 1, folder, 1)
     assert notes == []
