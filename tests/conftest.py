@@ -18,6 +18,7 @@ import pytest
 
 from tests.command_line import status_of
 from tests.fmu_copies import put_fmus
+from tests.fmus import models3
 from tests.reports import browser as browsers
 from yawbench.fmus import recipe
 from yawbench.fmus.build import build_component
@@ -26,6 +27,8 @@ from yawbench.foundation.workers import default_workers
 TESTS = Path(__file__).parent
 FMUS = TESTS / "fmus"
 """Folder of FMUs and components in C that are made for tests."""
+STEP = "if (fabs(law(s, v)) < v->moment_limit)"
+"""Line at which a new controller in C is given something to do that it should not."""
 LONGEST_FIRST = (
     *("scenarios", "trials", "studies", "ranking", "reports", "bench", "docs", "orchestrator", "commands"),
     *("interop", "measured_cars", "yawbench", "fmus"),
@@ -123,11 +126,26 @@ def common_cache(unpacked: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("YAWBENCH_CACHE", str(unpacked))
 
 
-def build_here(source: Path, folder: Path) -> Path:
-    """Build a component in C without its library for Windows, which takes as long as that for Linux."""
+def build_controller_in_c(folder: Path, act: str, name: str = "idea") -> Path:
+    """Build the controller in C that `yawbench new` begins with; first of all it does `act` in every step.
+
+    Without its library for Windows, which takes as long as that for Linux.
+    """
+    from yawbench.commands.new import begin
+
+    for path, text in begin("controller", name, "c", in_checkout=True).files.items():
+        file = folder / path
+        file.parent.mkdir(parents=True, exist_ok=True)
+        if file.suffix == ".c":
+            assert STEP in text
+            headers = "".join(
+                f"#include <{header}.h>\n" for header in ("signal", "stdio", "stdlib", "unistd")
+            )
+            text = headers + text.replace(STEP, f"{act}\n    {STEP}")
+        file.write_text(text)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(recipe, "MINGW", "no-compiler-for-windows")
-        return build_component(source, folder)
+        return build_component(folder / "components" / "controllers" / name, folder / "built")
 
 
 @pytest.fixture(scope="session")
@@ -140,6 +158,14 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def bare_library(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The same without the functions that many FMUs leave out, those for texts among them."""
     return compiled(FMUS / "foreign.c", tmp_path_factory.mktemp("bare") / "foreign.so", "-DBARE")
+
+
+@pytest.fixture(scope="session")
+def models(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The compiled library of all models of FMI 3."""
+    folder = tmp_path_factory.mktemp("models3")
+    (folder / "stubs.h").write_text(models3.stubs(), encoding="utf-8")
+    return compiled(models3.HERE / "models3.c", folder / "models3.so", f"-I{folder}")
 
 
 def compiled(source: Path, target: Path, *options: str) -> Path:

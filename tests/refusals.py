@@ -1,6 +1,7 @@
 """What tests ask of messages: codes, places, numbers and the names of things, never the wording.
 
 with refused(Kind, "some-code", names=("a.yaml:3", "'mas'")):   an error of this code that names these
+assert told(found, "some-code | a.yaml:3: units | 'mas' | 5 m")  diagnostics, each with code, place and names
 assert mentions(text, "'mas'", "0.5 s")                         a line of the text names all of these
 assert each_mentions(texts, ("plant",), ("tyre", "5 m"))        so many texts, or lines, each with its names
 """
@@ -9,7 +10,7 @@ from __future__ import annotations
 
 import contextlib
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from typing import Any
 
 import pytest
@@ -25,6 +26,13 @@ def texts_of(told: Any) -> tuple[str, ...]:
 def places_of(told: Iterable[Diagnostic]) -> list[tuple[str, str]]:
     """Return the code and the location of each diagnostic."""
     return [(one.code, str(one.location)) for one in told]
+
+
+def told(found: Collection[Diagnostic], lines: str) -> bool:
+    """Assert that there are as many diagnostics as lines, which say of each: `code | place | name | name`."""
+    expected = [line.split(" | ") for line in lines.splitlines()]
+    assert places_of(found) == [(code, place) for code, place, *_ in expected]
+    return each_mentions(found, *(tuple(names) for _, _, *names in expected))
 
 
 def mentions(text: object, *names: object) -> bool:

@@ -13,9 +13,9 @@ from pathlib import Path
 
 import pytest
 
+from tests.command_line import status_of
 from tests.refusals import mentions
 from tests.studies.test_sweep import UNITS, moods, rows, yawbench  # noqa: F401
-from yawbench.cli import main
 from yawbench.studies.executor import left_to_do
 from yawbench.studies.experiment import plan_experiment
 from yawbench.studies.jobs import Job, Outcome
@@ -281,9 +281,7 @@ def test_without_its_package_the_option_says_how_to_get_it(moods, fmus, capsys, 
     monkeypatch.setitem(sys.modules, "distributed", None)
     monkeypatch.delitem(sys.modules, "yawbench.cluster.cluster", raising=False)
     arguments = ["--fmus", str(fmus), "--out", str(tmp_path / "out"), "--scheduler", "tcp://127.0.0.1:9"]
-    with pytest.raises(SystemExit) as end:
-        main(["sweep", str(moods(10)), *arguments])
-    assert end.value.code == 2
+    assert status_of("sweep", moods(10), *arguments) == 2
     assert mentions(
         capsys.readouterr().err.splitlines()[-1], "--scheduler", "'yawbench[cluster]'", "distributed"
     )

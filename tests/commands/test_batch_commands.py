@@ -11,8 +11,8 @@ import sys
 
 import pytest
 
+from tests.command_line import status_of
 from tests.refusals import each_mentions, mentions
-from yawbench.cli import main
 from yawbench.foundation.safe_files import LOCK_FILE
 from yawbench.orchestrator.results.folder_lock import FolderLock
 
@@ -43,10 +43,6 @@ tables:
 claims:
   - {says: Without control there is no moment., holds_if: [{run: "off", metric: moment, at_most: 0}]}
   - {says: Control is gentle., holds_if: [{run: fuzzy_sideslip, metric: moment, at_most: 1 N.m}]}
-"""
-FIGURES = """
-figures:
-  - {name: moments, runs: ["*"], panels: [steer_angle, yaw_moment]}
 """
 
 
@@ -130,17 +126,6 @@ def test_converge_names_a_wrong_signal_or_algorithm(yawbench):
     status, _, said = yawbench("converge", "half.yaml", "--algorithm", "gauss")
     assert status == 2
     assert each_mentions(said, ("--algorithm gauss", "gauss_seidel", "jacobi", "extrapolated"))
-
-
-def test_study_runs_judges_and_draws(yawbench, folder):
-    (folder / "study.yaml").write_text(STUDY + FIGURES)
-    status, out, said = yawbench("study", "study.yaml", "--out", "o")
-    assert status == 0
-    assert mentions(out, "control", "moment")
-    assert mentions(out, "does not reproduce")
-    assert mentions(said.splitlines()[-1], "o/report.html", "page")
-    for name in ("report.html", "experiment.json", "table.csv", "figures/moments.svg", "figures/moments.png"):
-        assert (folder / "o" / name).stat().st_size > 0
 
 
 def test_study_makes_again_only_what_has_not_been_made_of_the_same_scenario(yawbench, folder):
@@ -328,7 +313,5 @@ def test_every_command_that_makes_runs_isolates_units_if_told(command, folder, f
 
     monkeypatch.setattr("yawbench.studies.jobs.ready", ready)
     monkeypatch.setattr("yawbench.studies.experiment.plans_of", ready)
-    with pytest.raises(SystemExit) as exit_:
-        main([*command, "--fmus", str(fmus), "--isolate", "--call-limit", "3 s"])
-    assert exit_.value.code == 7
+    assert status_of(*command, "--fmus", fmus, "--isolate", "--call-limit", "3 s") == 7
     assert set(limits) == {3.0}

@@ -14,18 +14,17 @@ import pytest
 import typer
 
 from tests.checkout import ROOT, run_in
+from tests.command_line import status_of
 from tests.refusals import each_mentions, mentions
 from yawbench import cli, overview
-from yawbench.cli import _application, main
+from yawbench.cli import _application
 from yawbench.foundation import plugins
 from yawbench.foundation.errors import Interrupted, ScenarioError
 from yawbench.foundation.messages import printable
 
 
 def say(capsys, *arguments):
-    with pytest.raises(SystemExit) as exit_:
-        main(list(arguments))
-    return exit_.value.code or 0, capsys.readouterr().out
+    return status_of(*arguments), capsys.readouterr().out
 
 
 def test_the_version_is_that_of_the_installed_distribution(capsys):
@@ -150,9 +149,7 @@ def test_a_signal_ends_every_command_with_a_word_and_the_same_status(name, numbe
     module = importlib.import_module(plugins.find("command", name).__module__)
     monkeypatch.setattr(module, name.replace("-", "_"), ended)
     before = signal.getsignal(signal.SIGTERM)
-    with pytest.raises(SystemExit) as end:
-        main([name])
-    assert end.value.code == 128 + number
+    assert status_of(name) == 128 + number
     assert capsys.readouterr().err == "Interrupted\n"
     assert signal.getsignal(signal.SIGTERM) is before
 
@@ -167,9 +164,7 @@ def test_a_signal_while_a_class_is_being_made_is_no_error_of_the_program(monkeyp
         type("Made", (), {"attribute": Stopping()})
 
     monkeypatch.setattr(importlib.import_module("yawbench.commands.cache"), "cache", ended)
-    with pytest.raises(SystemExit) as end:
-        main(["cache"])
-    assert end.value.code == 143
+    assert status_of("cache") == 143
     assert capsys.readouterr().err == "Interrupted\n"
 
 
@@ -185,8 +180,7 @@ def test_nothing_that_turns_the_text_reaches_the_terminal_even_in_a_traceback(
 
     monkeypatch.setattr(cli, "_application", lambda _: broken)
     monkeypatch.setenv(cli.TRACEBACK, shown)
-    with pytest.raises(SystemExit):
-        main(["list"])
+    status_of("list")
     said = capsys.readouterr().err
     assert ("Traceback" in said) == bool(shown)
     assert r"\u202etxt.exe \x1b[31m \u2066 \x9b" in said
@@ -194,9 +188,7 @@ def test_nothing_that_turns_the_text_reaches_the_terminal_even_in_a_traceback(
 
 
 def test_a_choice_that_does_not_exist_is_told_with_those_that_do(capsys):
-    with pytest.raises(SystemExit) as end:
-        main(["list", "foo"])
-    assert end.value.code == 2
+    assert status_of("list", "foo") == 2
     assert mentions(
         capsys.readouterr().err.splitlines()[-1],
         "'WHAT'",

@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+import io
 import json
 import re
 import shlex
 import shutil
 import sys
+from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from tests.checkout import copy_checkout, run_in
+from tests.command_line import status_of
+from tests.fmu_copies import put_fmus
 from tests.refusals import each_mentions, mentions
 from yawbench.cli import main
-from yawbench.fmus.build import build_all
 from yawbench.orchestrator.results.reader import load_results
 from yawbench.orchestrator.scenario import catalogue
 from yawbench.orchestrator.scenario.loader import load_scenario
@@ -48,49 +51,59 @@ def files(folder: Path) -> set[str]:
     return {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
 
 
+def called(folder: Path, *command: str | Path) -> tuple[int, str, str]:
+    """Return status, output and messages of a command in a folder; `yawbench` is called in this process."""
+    if Path(command[0]).name != "yawbench":
+        done = run_in(folder, *command)
+        return done.returncode, done.stdout, done.stderr
+    out, said = io.StringIO(), io.StringIO()
+    with pytest.MonkeyPatch.context() as patch, redirect_stdout(out), redirect_stderr(said):
+        patch.chdir(folder)
+        status = status_of(*command[1:])
+    return status, out.getvalue(), said.getvalue()
+
+
 @pytest.fixture(scope="module")
 def project(tmp_path_factory):
     """A folder outside the checkout with a controller in Python and one in C, taken as far as a run."""
     folder = tmp_path_factory.mktemp("project")
     printed = {}
     for name, language in (("follow", "python"), ("follow_c", "c")):
-        done = run_in(folder, "yawbench", "new", "controller", name, "--language", language)
-        assert done.returncode == 0, done.stderr
-        printed[name] = [shlex.split(line) for line in done.stdout.splitlines()]
+        status, out, said = called(folder, "yawbench", "new", "controller", name, "--language", language)
+        assert status == 0, said
+        printed[name] = [shlex.split(line) for line in out.splitlines()]
     everything, *of_python, _ = printed["follow"]
     assert everything[1] == "build"
     assert everything[-2:] == ["--out", "fmus"]
     assert {*everything[2:-2]} == {*UNITS} - {"controller_fnn", "controller_fuzzy_sideslip"}
-    build_all(folder / "fmus", components=UNITS)  # quicker than everything
+    put_fmus(folder / "fmus", components=UNITS)  # quicker than building everything
     for command in (*of_python, *printed["follow_c"][1:-1]):
-        done = run_in(folder, *command)
-        assert done.returncode == 0, done.stdout + done.stderr
-        assert "pytest" not in command or "5 passed" in done.stdout
+        status, out, said = called(folder, *command)
+        assert status == 0, out + said
+        assert "pytest" not in command or "5 passed" in out
     return folder, printed
 
 
 def test_an_exercise_is_failed_as_it_begins_and_passed_with_a_law(project):
     folder, _ = project
-    done = run_in(folder, "yawbench", "new", "exercise", "hold")
-    assert done.returncode == 0, done.stderr
-    _, build, test, study, mark = [shlex.split(line) for line in done.stdout.splitlines()]
+    status, out, said = called(folder, "yawbench", "new", "exercise", "hold")
+    assert status == 0, said
+    _, build, test, study, mark = [shlex.split(line) for line in out.splitlines()]
     law = folder / "controllers" / "hold.py"
     begun = law.read_text()
     results = []
     for text in (begun, begun.replace("return 0.0  # your part", "return 2e4 * (yaw_rate_ref - yaw_rate)")):
         law.write_text(text)
-        done = [run_in(folder, *command) for command in (build, test, study, mark)]
-        assert [one.returncode for one in done[::2]] == [0, 0], [one.stderr for one in done]
+        done = [called(folder, *command) for command in (build, test, study, mark)]
+        assert [status for status, *_ in done[::2]] == [0, 0], [said for *_, said in done]
         record = json.loads((folder / "results/hold/exercise/experiment.json").read_text())
         marks = (folder / "exercises/hold/marks.csv").read_text().splitlines()[1].split(",")
-        results.append(
-            (done[1].returncode, [check["holds"] for check in record["checks"]], done[3].returncode, marks[2])
-        )
+        results.append((done[1][0], [check["holds"] for check in record["checks"]], done[3][0], marks[2]))
     assert results == [(1, [False, True, False], 1, "fail"), (0, [True, True, True], 0, "pass")]
     submission = folder / "broken.py"
     submission.write_text("raise RuntimeError('no law yet')")
-    done = run_in(folder, *mark, submission)
-    assert done.returncode == 1 and mentions(done.stdout, "broken.py", "0 of 2", "no law yet")
+    status, out, _ = called(folder, *mark, submission)
+    assert status == 1 and mentions(out, "broken.py", "0 of 2", "no law yet")
     marking, endless, leaving = (
         folder / "exercises/hold/mark.py",
         folder / "endless.py",
@@ -99,10 +112,8 @@ def test_an_exercise_is_failed_as_it_begins_and_passed_with_a_law(project):
     marking.write_text(re.sub(r"LIMIT = .*", "LIMIT = 20.0", marking.read_text()))
     endless.write_text(begun.replace("return 0.0  # your part", "while True: pass"))
     leaving.write_text("import os; os._exit(0)")
-    done = run_in(folder, *mark, endless, leaving, submission)
-    assert each_mentions(
-        done.stdout, ("endless.py", "0 of 2", "20 s"), ("leaving.py", "0 of 2"), ("no law yet",)
-    )
+    _, out, _ = called(folder, *mark, endless, leaving, submission)
+    assert each_mentions(out, ("endless.py", "0 of 2", "20 s"), ("leaving.py", "0 of 2"), ("no law yet",))
     rows = [line.split(",")[:3] for line in marking.with_name("marks.csv").read_text().splitlines()[1:]]
     assert rows == [[str(one), "0", "fail"] for one in (endless, leaving, submission)]
     assert "hold" in (folder / "exercises/hold/README.md").read_text()

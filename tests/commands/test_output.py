@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 
+from tests.command_line import status_of
 from tests.commands.test_batch_commands import SCENARIO, STUDY
 from tests.refusals import mentions
 from yawbench.cli import main
@@ -226,9 +227,7 @@ def test_notes_are_in_the_object_as_infos_and_warnings(answers):
 def test_latex_is_all_that_is_printed_and_compiles_by_its_shape(fmus, tmp_path, monkeypatch, capfd):
     (tmp_path / "half.yaml").write_text(SCENARIO)
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(SystemExit) as ended:
-        main(["check", "half.yaml", "--fmus", str(fmus), "--latex"])
-    assert not ended.value.code
+    assert status_of("check", "half.yaml", "--fmus", fmus, "--latex") == 0
     text = capfd.readouterr().out
     tables = text.split("\\end{table}\n")
     assert len(tables) > 3
@@ -267,7 +266,5 @@ def test_a_command_that_takes_long_to_open_fmus_says_so(monkeypatch, capsys):
 
 def test_a_quantity_of_the_car_without_its_word_is_told_with_it(capsys):
     for setting, meant in (("mass=1200", "vehicle.mass=1200"), ("frction=0.3", "friction")):
-        with pytest.raises(SystemExit) as ended:
-            main(["run", "fnn_sideslip/25mps", "--set", setting])
-        assert ended.value.code == 2
+        assert status_of("run", "fnn_sideslip/25mps", "--set", setting) == 2
         assert mentions(capsys.readouterr().err, f"--set {setting}", meant)

@@ -12,9 +12,9 @@ from pathlib import Path
 import pytest
 
 from tests.cars import load_scenario, make_plan
+from tests.command_line import status_of
 from tests.fmu_copies import put_fmus
 from tests.refusals import each_mentions, mentions
-from yawbench.cli import main
 from yawbench.fmus.build import build_component
 from yawbench.orchestrator.master import log
 from yawbench.orchestrator.master.fmi import open_instance
@@ -152,15 +152,6 @@ def test_the_record_tells_everything_needed_to_repeat_the_run(yawbench, fmus, tm
     assert run["wall_time"] > 0
 
 
-def test_results_go_to_a_folder_named_after_the_scenario(yawbench, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    scenario = car(tmp_path / "study")
-    status, said = yawbench(scenario)
-    assert status == 0
-    assert said.startswith(f"{Path('results', 'study', 'car')}: ")
-    assert len(load_results(tmp_path / "results" / "study" / "car").time) == 51
-
-
 def test_runs_of_other_settings_and_one_that_fails_leave_all_results_readable(
     yawbench, faulty, tmp_path, monkeypatch
 ):
@@ -182,24 +173,6 @@ def test_runs_of_other_settings_and_one_that_fails_leave_all_results_readable(
     assert yawbench(scenario, "--name", "good", "--out", "x")[0] == 2
 
 
-def test_a_swapped_unit_and_a_set_parameter_reach_the_run(yawbench, tmp_path):
-    scenario = car(tmp_path)
-    yawbench(scenario, "--out", tmp_path / "a")
-    yawbench(scenario, "--out", tmp_path / "b", "--swap", "controller=controller_off")
-    yawbench(scenario, "--out", tmp_path / "c", "--set", "plant.initial_speed=20")
-    assert abs(load_results(tmp_path / "a")["controller.yaw_moment"]).max() > 0
-    assert abs(load_results(tmp_path / "b")["controller.yaw_moment"]).max() == 0
-    assert load_results(tmp_path / "c")["plant.velocity_x"][0] == 20.0
-
-
-def test_the_same_run_gives_the_same_bytes(yawbench, tmp_path):
-    scenario = car(tmp_path)
-    yawbench(scenario, "--out", tmp_path / "a")
-    yawbench(scenario, "--out", tmp_path / "b")
-    first, second = ((tmp_path / name / "results.csv").read_bytes() for name in "ab")
-    assert first == second
-
-
 def test_two_units_of_one_fmu_have_their_own_state(yawbench, tmp_path):
     scenario = tmp_path / "two.yaml"
     scenario.write_text(
@@ -219,9 +192,7 @@ def test_paths_with_spaces_and_umlauts_work(fmus, tmp_path, monkeypatch, capsys)
     scenario = car(folder / "Läufe 1")
     put_fmus(folder / "meine FMUs", components=UNITS)
     monkeypatch.chdir(folder)
-    with pytest.raises(SystemExit) as exit_:
-        main(["run", "Läufe 1/car.yaml", "--fmus", "meine FMUs", "--out", "Ergebnis ä"])
-    assert exit_.value.code == 0
+    assert status_of("run", "Läufe 1/car.yaml", "--fmus", "meine FMUs", "--out", "Ergebnis ä") == 0
     assert capsys.readouterr().err.startswith("Ergebnis ä: 51 rows")
     assert len(load_results(folder / "Ergebnis ä").time) == 51
     assert scenario.exists()
@@ -247,26 +218,6 @@ def test_an_exception_in_a_component_is_one_sentence_with_file_and_line(yawbench
     assert error.traceback[0].rstrip().endswith("100 % größer 1")
 
 
-@pytest.mark.parametrize(("value", "word"), [("float('nan')", "not a number"), ("1e999", "infinite")])
-def test_a_value_that_is_not_finite_stops_the_run_and_names_its_wire(
-    value, word, yawbench, faulty, fmus, tmp_path
-):
-    faulty(value=f"{value} if t > 0.0145 else 0.0")
-    scenario = car(tmp_path)
-    fmu = tmp_path / "controller_faulty.fmu"
-    status, said = yawbench(scenario, "--out", tmp_path / "out", "--swap", f"controller={fmu}")
-    assert status == 1
-    assert mentions(
-        said.splitlines(),
-        "controller",
-        "yaw_moment",
-        "0.016 s",
-        "controller.yaw_moment",
-        "allocator.yaw_moment",
-    )
-    assert load_results(tmp_path / "out").time[-1] == 0.015
-
-
 def test_a_warning_of_a_component_is_shown_and_recorded(yawbench, faulty, tmp_path):
     status, said = yawbench(faulty('self.warn("tyres are 90 % warm")'), "--out", tmp_path / "out")
     assert status == 0
@@ -280,15 +231,6 @@ def test_a_warning_of_a_component_is_shown_and_recorded(yawbench, faulty, tmp_pa
         ("90 %", "tyres", "warm"),
         ("90 %", "tyres", "warm"),
     )
-
-
-def test_ctrl_c_inside_a_component_ends_the_run_after_the_step(yawbench, faulty, tmp_path):
-    status, said = yawbench(faulty("os.kill(os.getpid(), signal.SIGINT)"), "--out", tmp_path / "out")
-    assert status == 130
-    assert each_mentions(said.splitlines(), ("0.06 s", "interrupted"), ("out", "recorded"))
-    results = load_results(tmp_path / "out")
-    assert results.record.status == "interrupted"
-    assert results.time[-1] == 0.06
 
 
 def run_process(*arguments):

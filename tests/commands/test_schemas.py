@@ -15,7 +15,7 @@ from typing import Any
 import jsonschema
 import pytest
 
-from yawbench.cli import main
+from tests.command_line import status_of
 from yawbench.commands.new import begin
 from yawbench.commands.schema import kinds, model_of, schema_of, schema_text
 from yawbench.measured_cars import fit_file as fit
@@ -107,12 +107,10 @@ def test_new_files_are_valid_and_name_their_schema(kind, tmp_path):
 
 
 def test_the_command_lists_the_kinds_and_prints_a_schema(capsys):
-    with pytest.raises(SystemExit):
-        main(["schema"])
+    status_of("schema")
     assert capsys.readouterr().out.split() == [*kinds()]
     for name, kind in {"fit": "fit", "sweep": "experiment"}.items():
-        with pytest.raises(SystemExit):
-            main(["schema", name])
+        status_of("schema", name)
         assert capsys.readouterr().out == schema_text(kind)
 
 

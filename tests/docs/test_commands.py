@@ -32,7 +32,7 @@ NOT_RUN = {
     r"\S*yawbench study scenarios/fuzzy_pid/\w+\.yaml": "tests/scenarios/test_fuzzy_pid.py",
     r"\S*yawbench serve.*": "until Ctrl-C; tests/bench/test_serve.py",
     r"\S*yawbench drive .*": "minutes; test_sine_with_dwell.py drives short ones",
-    r"\S*yawbench rank.*": "half an hour; tests/ranking/test_ranking.py drives a small one",
+    r"\S*yawbench rank.*": "half an hour; tests/ranking/test_ranking_page.py drives a small one",
     r"\S*yawbench compare scenarios/one_car/\S+ --swap plant=\S+": "test_vehicles.py: shorter runs",
     r"\S*yawbench vehicle show \S+ --plant \S+": "four plants; test_vehicles.py drives each",
 }

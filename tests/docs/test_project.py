@@ -1,10 +1,9 @@
-"""Facts of the project: one version, one date, lists of files that exist, hooks that can run."""
+"""Facts of the project: one version, one date, lists of files that exist."""
 
 from __future__ import annotations
 
 import re
 import sys
-from pathlib import Path
 
 import pytest
 from ruamel.yaml import YAML
@@ -56,18 +55,6 @@ def test_make_has_every_target_that_the_contributing_guide_and_the_readme_name()
     text = CONTRIBUTING + (ROOT / "README.md").read_text(encoding="utf-8")
     targets = set(re.findall(r"^([\w-]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE))
     assert set(re.findall(r"^    make ([\w-]+)", text, re.MULTILINE)) <= targets
-
-
-def test_hooks_before_a_commit_call_programs_that_make_lint_installs():
-    hooks = YAML(typ="safe").load(ROOT / ".pre-commit-config.yaml")["repos"][0]["hooks"]
-    installed = {
-        re.split(r"[><=]", wanted)[0] for wanted in PROJECT["project"]["optional-dependencies"]["lint"]
-    }
-    called = {Path(hook["entry"].split()[0]).name for hook in hooks if hook["language"] == "system"}
-    assert called == {"ruff", "mypy"} <= installed
-    for hook in hooks:
-        if hook["language"] == "pygrep":
-            re.compile(hook["entry"])
 
 
 def test_tests_that_the_security_policy_names_exist():

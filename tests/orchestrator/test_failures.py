@@ -50,29 +50,19 @@ def raise_at(when, error):
     return act
 
 
-def test_a_failed_step_is_one_sentence_with_unit_time_and_reason(tmp_path):
+def test_a_failed_step_is_a_sentence_that_keeps_the_rows_before_and_frees_every_instance_once(tmp_path):
     units = ramp_into(raise_at(0.5, ValueError("velocity_x must exceed 1 m/s (got 0.2)")))
-    sentence, results, _ = fail(tmp_path, units, ["source.x -> target.x"])
+    sentence, results, slaves = fail(tmp_path, units, ["source.x -> target.x"])
     assert mentions(sentence, "target", "0.5 s", "ValueError", "velocity_x", "1 m/s", "0.2")
     assert results.record.status == "failed"
     assert results.record.error.message == sentence
     assert results.record.error.instance == "target"
     assert results.record.error.time == 0.5
     assert json.loads(results.record.to_json())["error"]["unit"] == "target"  # the key of earlier versions
-
-
-def test_a_failed_run_keeps_the_rows_before_and_the_inputs_of_the_failed_step(tmp_path):
-    units = ramp_into(raise_at(0.5, ValueError("no")))
-    _, results, _ = fail(tmp_path, units, ["source.x -> target.x"])
     assert results.time.tolist() == [0.0, 0.1, 0.2, 0.3, 0.4, 0.5]
     assert results["target.y"].tolist() == results["source.x"].tolist()
     assert results.record.rows == 6
     assert results.record.error.inputs == {"x": pytest.approx(6.0)}
-
-
-def test_every_instance_is_freed_exactly_once_after_a_failure(tmp_path):
-    units = ramp_into(raise_at(0.5, ValueError("no")))
-    _, _, slaves = fail(tmp_path, units, ["source.x -> target.x"])
     assert [slave.freed for slave in slaves.values()] == [1, 1]
     assert slaves["target"].worst == ERROR
 
@@ -363,6 +353,9 @@ def test_an_interrupted_run_ends_between_two_steps_and_keeps_its_results(number,
     assert results.time.tolist()[-1] == 0.6
     assert [slave.freed for slave in slaves.values()] == [1, 1]
     assert signal.getsignal(number) is before
+    units = {"a": Clock(x=math.sin)}
+    simulate(make_plan(units), tmp_path / "whole", opener=Stage(units))
+    assert signal.getsignal(number) is before
 
 
 def test_a_run_interrupted_during_initialization_has_no_rows(tmp_path):
@@ -391,14 +384,7 @@ def test_a_failure_before_all_inputs_are_known_records_those_that_are(tmp_path):
     assert results.record.error.inputs == {"x_in": "nan", "flag_in": True}
 
 
-def test_handlers_are_restored_after_a_run(tmp_path):
-    before = signal.getsignal(signal.SIGINT)
-    units = {"a": Clock(x=math.sin)}
-    simulate(make_plan(units), tmp_path, opener=Stage(units))
-    assert signal.getsignal(signal.SIGINT) is before
-
-
-def test_a_failed_run_stands_beside_the_results_of_one_that_reached_its_end(tmp_path):
+def test_a_failed_run_stands_beside_results_until_another_reaches_its_end_and_replaces_both(tmp_path):
     units = {"a": Clock(x=math.sin)}
     simulate(make_plan(units), tmp_path, opener=Stage(units))
     failing = ramp_into(raise_at(0.5, ValueError("no")))
@@ -413,10 +399,6 @@ def test_a_failed_run_stands_beside_the_results_of_one_that_reached_its_end(tmp_
     assert list(beside) == ["source.x", "target.y"]
     assert beside.record.status == "failed"
     assert sorted(p.name for p in tmp_path.iterdir()) == ["failed", "results.csv", "run.json"]
-
-
-def test_a_run_that_reaches_its_end_replaces_good_and_failed_results(tmp_path):
-    test_a_failed_run_stands_beside_the_results_of_one_that_reached_its_end(tmp_path)
     units = {"b": Clock(y=math.sin)}
     simulate(make_plan(units), tmp_path, opener=Stage(units))
     assert list(load_results(tmp_path)) == ["b.y"]

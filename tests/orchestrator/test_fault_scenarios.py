@@ -9,10 +9,10 @@ import pytest
 from matplotlib.colors import to_hex
 
 import yawbench as yb
+from tests.command_line import status_of
 from tests.fmus.fake_fmus import Var, make_fmu, out
 from tests.orchestrator.recorded import car, noted
 from tests.refusals import each_mentions, mentions, texts_of
-from yawbench.cli import main
 from yawbench.figures.plots import FAULTY, LabelledRun, draw
 from yawbench.foundation.errors import ScenarioError, YawbenchError
 from yawbench.orchestrator.fault_kinds import Fault, FaultLocation, FaultySignal
@@ -249,9 +249,7 @@ def test_faults_stay_data_on_the_way_from_where_they_are_written(folder):
 
 
 def yawbench_status(*arguments):
-    with pytest.raises(SystemExit) as exit_:
-        main(list(arguments))
-    return exit_.value.code
+    return status_of(*arguments)
 
 
 def test_check_shows_faults_and_an_archive_says_that_it_has_none(folder, capsys):

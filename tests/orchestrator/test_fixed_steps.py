@@ -11,9 +11,9 @@ import pytest
 
 from tests.cars import load_scenario, make_plan
 from tests.changed import changed
+from tests.command_line import status_of
 from tests.conftest import compiled
 from tests.fmus.fake_fmus import make_fmu, model_description
-from yawbench.cli import main
 from yawbench.fmus.description import binary_of
 from yawbench.foundation.errors import Diagnostic
 from yawbench.orchestrator.results.reader import load_results
@@ -150,9 +150,7 @@ def test_check_and_run_warn_and_the_proposal_gives_the_right_numbers(tmp_path, c
     (tmp_path / "s.yaml").write_text("stop_time: 0.1\nstep_size: 0.001\nunits: {one: {fmu: ./g.fmu}}\n")
 
     def command(*arguments: str) -> str:
-        with pytest.raises(SystemExit) as exit_:
-            main([arguments[0], str(tmp_path / "s.yaml"), *arguments[1:]])
-        assert not exit_.value.code
+        assert status_of(arguments[0], tmp_path / "s.yaml", *arguments[1:]) == 0
         return "".join(capsys.readouterr())
 
     assert "one.step_size=0.01" in command("check")

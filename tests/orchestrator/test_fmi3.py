@@ -9,8 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.conftest import compiled
-from tests.fmus import models3
 from tests.fmus.models3 import make_fmu
 from tests.orchestrator.test_foreign import write_fmu
 from tests.refusals import mentions
@@ -22,14 +20,6 @@ together_and_apart = pytest.mark.parametrize("isolate", [[], ["--isolate"]], ids
 mostly_together = pytest.mark.parametrize(
     "isolate", [[], pytest.param(["--isolate"], marks=pytest.mark.exhaustive)], ids=["together", "apart"]
 )
-
-
-@pytest.fixture(scope="session")
-def models(tmp_path_factory):
-    """The compiled library of all models."""
-    folder = tmp_path_factory.mktemp("models3")
-    (folder / "stubs.h").write_text(models3.stubs(), encoding="utf-8")
-    return compiled(models3.HERE / "models3.c", folder / "models3.so", f"-I{folder}")
 
 
 @pytest.fixture

@@ -101,14 +101,6 @@ def test_a_failed_instance_is_ended_as_the_standard_allows(fmu, held, answer, en
     }  # fmt: skip
 
 
-def test_a_warning_with_printf_arguments_is_readable(fmu, held, tmp_path):
-    info = simulate(chain(fmu, 1), tmp_path / "out")
-    assert each_mentions(
-        [(m.instance, m.time, m.text) for m in info.warnings], ("0.25", "3", "99.5%", "valve", "gedacht")
-    )
-    assert counters(fmu) == [2, 2, 2]
-
-
 @pytest.mark.parametrize("isolated", [False, True], ids=["together", "apart"])
 @pytest.mark.parametrize("answer", [-1, 42])
 def test_an_invalid_status_ends_the_run(fmu, answer, isolated, tmp_path):

@@ -9,11 +9,11 @@ import sys
 import pyarrow.parquet as pq
 import pytest
 
+from tests.command_line import status_of
 from tests.fmu_copies import put_fmus
 from tests.orchestrator.fakes import Clock, Function, Stage, make_plan
 from tests.orchestrator.recorded import car, record_text, write
 from tests.refusals import mentions, refused
-from yawbench.cli import main
 from yawbench.foundation.errors import ResultsError, ScenarioError, SimulationError, YawbenchError
 from yawbench.foundation.messages import listed
 from yawbench.orchestrator.master.simulate import simulate, simulate_in_memory
@@ -233,12 +233,6 @@ def test_a_record_that_names_another_file_is_refused(tmp_path):
         load_results(folder)
 
 
-def main_ok(arguments):
-    with pytest.raises(SystemExit) as end:
-        main(arguments)
-    assert end.value.code in (0, None)
-
-
 SCENARIO = """
 title: A driver alone
 stop_time: 1
@@ -258,8 +252,8 @@ def driver(tmp_path_factory):
 
 def test_run_writes_the_format_it_is_told_and_prints_metrics(driver, tmp_path, capsys):
     (tmp_path / "alone.yaml").write_text(SCENARIO)
-    common = [str(tmp_path / "alone.yaml"), "--fmus", str(driver), "--format", "parquet"]
-    main_ok(["run", *common, "--out", str(tmp_path / "run"), "--metric", "peak(steer_angle)"])
+    common = (tmp_path / "alone.yaml", "--fmus", driver, "--format", "parquet")
+    assert status_of("run", *common, "--out", tmp_path / "run", "--metric", "peak(steer_angle)") == 0
     told = capsys.readouterr().out
     assert mentions(told, "Steer", "angle", "peak")
     assert "5.73 °" in told
@@ -293,18 +287,7 @@ def test_a_format_or_a_metric_that_there_is_not_is_said_before_the_run(
     option, sentence, driver, tmp_path, capsys
 ):
     (tmp_path / "alone.yaml").write_text(SCENARIO)
-    with pytest.raises(SystemExit) as end:
-        main(
-            [
-                "run",
-                str(tmp_path / "alone.yaml"),
-                "--fmus",
-                str(driver),
-                "--out",
-                str(tmp_path / "out"),
-                *option,
-            ]
-        )
-    assert end.value.code == 2
+    scenario, out = tmp_path / "alone.yaml", tmp_path / "out"
+    assert status_of("run", scenario, "--fmus", driver, "--out", out, *option) == 2
     assert capsys.readouterr().err == f"{sentence}\n"
     assert not (tmp_path / "out").exists()

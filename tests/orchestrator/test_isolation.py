@@ -12,10 +12,9 @@ import pytest
 
 from tests.cars import make_plan
 from tests.changed import changed
-from tests.conftest import build_here
+from tests.command_line import status_of
+from tests.conftest import build_controller_in_c
 from tests.refusals import mentions
-from yawbench.cli import main
-from yawbench.commands.new import begin
 from yawbench.foundation.errors import SimulationError
 from yawbench.orchestrator.master.isolation import Isolation
 from yawbench.orchestrator.master.simulate import simulate
@@ -28,9 +27,6 @@ UNITS = (
     "driver_sine", "reference_steady_state", "controller_fnn", "allocator_load_proportional",
     "wheel_control_direct", "plant_seven_dof", "tyre_dugoff",
 )  # fmt: skip
-STEP = "if (fabs(law(s, v)) < v->moment_limit)"
-"""Line at which the controller in C is given something to do that it should not."""
-
 needs_cc = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler")
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="--isolate needs Linux or macOS")
 
@@ -40,16 +36,7 @@ def foreign(tmp_path):
     """Build a controller in C that does `act` from t = 0.05 s on; return its path."""
 
     def build(act):
-        for path, text in begin("controller", "idea", "c", in_checkout=True).files.items():
-            file = tmp_path / path
-            file.parent.mkdir(parents=True, exist_ok=True)
-            if file.name == "idea.c":
-                assert STEP in text
-                text = text.replace(STEP, f"if (t > 0.0495) {{ {act} }}\n    {STEP}")
-                headers = ("signal", "stdio", "stdlib", "unistd")
-                text = "".join(f"#include <{name}.h>\n" for name in headers) + text
-            file.write_text(text)
-        return build_here(tmp_path / "components" / "controllers" / "idea", tmp_path / "built")
+        return build_controller_in_c(tmp_path, f"if (t > 0.0495) {{ {act} }}")
 
     return build
 
@@ -62,9 +49,7 @@ def run(fmus, tmp_path, capsys):
         out = tmp_path / "out"
         options = ["--fmus", str(fmus), "--no-build", "--out", str(out), "--set", "stop_time=0.1"]
         options += ["--swap", f"controller={controller}", *arguments, *(["--isolate"] if isolate else [])]
-        with pytest.raises(SystemExit) as exit_:
-            main(["run", str(CAR), *options])
-        return exit_.value.code, capsys.readouterr().err, load_results(out)
+        return status_of("run", CAR, *options), capsys.readouterr().err, load_results(out)
 
     return go
 
@@ -217,7 +202,5 @@ def test_a_failure_in_an_isolated_unit_is_the_sentence_of_one_that_is_not(fmus, 
     [("0 s", "--call-limit"), ("0", "(got 0)"), ("soon", "--call-limit")],
 )
 def test_a_limit_that_is_no_time_is_refused(option, says, capsys):
-    with pytest.raises(SystemExit) as exit_:
-        main(["run", str(CAR), "--isolate", "--call-limit", option])
-    assert exit_.value.code == 2
+    assert status_of("run", CAR, "--isolate", "--call-limit", option) == 2
     assert says in capsys.readouterr().err

@@ -10,9 +10,9 @@ import pyarrow.parquet as pq
 import pytest
 
 import yawbench as yb
+from tests.command_line import status_of
 from tests.refusals import each_mentions, mentions
 from tests.reports.made_up import unpacked
-from yawbench.cli import main
 from yawbench.foundation.errors import ResultsError, ScenarioError
 from yawbench.measured_cars.single_track import start_states
 from yawbench.measurements.measured_results import load_run
@@ -248,12 +248,6 @@ def test_commands_take_measurement_files(tmp_path, monkeypatch, capsys):
     write_csv(Path("other.csv"), COLUMNS | {"Gier": 1.1 * COLUMNS["Gier"]})
     described(Path())
     Path("other.yaml").write_text(HEAD.replace("FILE", "other.csv"))
-
-    def status_of(*arguments: str) -> int:
-        with pytest.raises(SystemExit) as ended:
-            main(arguments)
-        return int(ended.value.code or 0)
-
     assert status_of("plot", "measured.yaml", "other.yaml", "--panel", "yaw_rate", "--out", "out") == 0
     assert Path("out/runs.svg").exists() or list(Path("out").glob("*.svg"))
     assert status_of("diff", "measured.yaml", "other.yaml") == 0

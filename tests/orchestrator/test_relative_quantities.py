@@ -10,10 +10,10 @@ from pathlib import Path
 import pytest
 
 from tests.changed import changed
+from tests.command_line import status_of
 from tests.fmus.fake_fmus import Var, make_fmu, out
 from tests.interop.test_ssp_units import archive, component, connector, wire
 from tests.orchestrator.test_foreign import write_fmu
-from yawbench.cli import main
 from yawbench.fmus.archive import open_fmu
 from yawbench.fmus.fmu import Variable
 from yawbench.foundation.errors import YawbenchError
@@ -163,9 +163,7 @@ def test_a_run_of_differences_gives_the_same_numbers_as_its_archive(standard, li
         ["export-ssp", str(tmp_path / "s.yaml"), "--standard", standard, "--out", str(ssp)],
         ["run", str(ssp), "--out", str(folders[1])],
     ):
-        with pytest.raises(SystemExit) as exit_:
-            main(arguments)
-        assert not exit_.value.code, capsys.readouterr().err
+        assert status_of(*arguments) == 0, capsys.readouterr().err
     with zipfile.ZipFile(ssp) as held:
         assert b'suppressUnitConversion="true"' in held.read("SystemStructure.ssd")  # others would add 273.15
     assert load_results(folders[0])["b.Real_out"][-1] == 28.0

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
+from tests.command_line import status_of
 from tests.fmu_copies import put_fmus
 from tests.orchestrator.fakes import Clock, make_plan
 from tests.refusals import mentions
-from yawbench.cli import main
 from yawbench.orchestrator.results import file_formats
 from yawbench.orchestrator.results.file_formats import expected_size, size_note
 
@@ -43,9 +43,7 @@ def test_run_tells_before_it_starts(tmp_path, monkeypatch, capsys):
     put_fmus(tmp_path, components=["driver_sine"])
     (tmp_path / "a.yaml").write_text("stop_time: 1\nstep_size: 0.01\nunits: {driver: {fmu: driver_sine}}\n")
     out = tmp_path / "out"
-    with pytest.raises(SystemExit) as exit_:
-        main(["run", str(tmp_path / "a.yaml"), "--out", str(out), "--fmus", str(tmp_path)])
-    assert not exit_.value.code
+    assert status_of("run", tmp_path / "a.yaml", "--out", out, "--fmus", tmp_path) == 0
     first, last = capsys.readouterr().err.splitlines()
     assert mentions(
         first, "note", "results.csv", "7 kB", "101 rows", "3 variables", "'record:'", "--format", "3 kB"

@@ -12,9 +12,9 @@ import pytest
 
 from tests.cars import load_scenario, make_plan
 from tests.changed import changed
+from tests.command_line import status_of
 from tests.orchestrator.tir_files import write
 from tests.refusals import mentions, refused, texts_of
-from yawbench.cli import main
 from yawbench.foundation.errors import ScenarioError, WiringError, warnings_in
 from yawbench.interop.ssp_write import write_ssp
 from yawbench.orchestrator.results.folder_names import default_folder
@@ -69,9 +69,7 @@ def plan(path, fmus, *swaps, **settings):
 
 def yawbench(arguments):
     """Return the exit status of the command."""
-    with pytest.raises(SystemExit) as done:
-        main(arguments)
-    return done.value.code
+    return status_of(*arguments)
 
 
 def parameters(planned, unit="tyre"):

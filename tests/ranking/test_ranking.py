@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import csv
-import json
-from math import degrees, radians
+from math import radians
 from pathlib import Path
-from xml.etree import ElementTree
 
 import pytest
 
@@ -181,55 +179,6 @@ entries:
 
 def rows(file: Path) -> list[dict[str, str]]:
     return list(csv.DictReader(file.open()))
-
-
-def test_a_small_matrix_is_driven_goes_on_where_it_was_and_shows_what_is_missing(tmp_path, capsys):
-    file, out = tmp_path / "small.yaml", tmp_path / "out"
-    file.write_text(SMALL)
-    assert status_of("rank", file, "--out", out, "--only", "fuzzy_pid", "--jobs", 2) == 0
-    assert mentions(capsys.readouterr().err, "ranked", "missing", "none")
-    page = (out / "report.html").read_text()
-    assert mentions(page, "build", "control")
-    lacking = rows(out / "table.csv")
-    assert [(one["entry"], one["place"]) for one in lacking] == [("fuzzy_pid", "1"), ("none", "")]
-    assert status_of("rank", file, "--out", out, "--jobs", 2) == 0
-    assert mentions(capsys.readouterr().err, "4 runs", "2", "finished")
-    found = rows(out / "table.csv")
-    assert [(one["entry"], one["place"], one["passed"]) for one in found] == [
-        ("fuzzy_pid", "1", "2"), ("none", "1", "0"),
-    ]  # fmt: skip
-    assert found[0] == lacking[0]  # what has been made is not made again
-    cells = {(one["entry"], one["condition"]): one for one in rows(out / "cells.csv")}
-    assert {key: one["state"] for key, one in cells.items()} == {
-        ("fuzzy_pid", "dry"): "passed", ("fuzzy_pid", "low"): "passed",
-        ("none", "dry"): "failed", ("none", "low"): "failed",
-    }  # fmt: skip
-    assert 0 < float(found[0]["step_time [s]"]) < 0.005
-    held, free = (float(one["intervention [N.m.s]"]) for one in found)
-    assert free < 0.001 * held  # what the engine's lag leaves of the driver's force
-    assert len(rows(out / "runs.csv")) == 4
-    page = (out / "report.html").read_text()
-    assert 'href="#cell?id=fuzzy-pid-in-low"' in page
-    sides = {path.stem: path.read_text() for path in (out / "data").glob("*.js")}
-    assert set(sides) == {f"{entry}-in-{name}" for entry in ("fuzzy-pid", "none") for name in ("dry", "low")}
-    (low,) = (one for one in rows(out / "runs.csv") if (one["entry"], one["condition"]) == ("none", "low"))
-    content = json.loads(sides["none-in-low"].partition(", ")[2].rstrip(");\n"))
-    run, *_ = content["data"]["runs"]  # then the best of those that hold the car
-    assert {"x", "y", "yaw"} <= set(run["road"])  # what the car on the road needs
-    assert low["verdict"] in content["html"]
-    assert mentions(content["html"], "sine-with-dwell", "drive")
-    capsys.readouterr()
-    assert status_of("rank", file, "--out", out, "--no-run", "--json") == 0
-    answer = json.loads(capsys.readouterr().out)
-    places = {entry["entry"]: entry["place"] for entry in answer["entries"]}
-    assert places == {"fuzzy_pid": 1, "none": 1}
-    assert (answer["page"], answer["folder"]) == (str(out / "report.html"), str(out))
-    judged = ("--no-run", "--strict", "--junit", tmp_path / "verdicts.xml")
-    assert status_of("rank", file, "--out", out, *judged) == 1
-    root = ElementTree.parse(tmp_path / "verdicts.xml").getroot()
-    assert (root.get("tests"), root.get("failures"), root.get("errors")) == ("4", "2", "0")
-    slip = float(low["sideslip [rad]"])
-    assert mentions(root.find(".//testcase[@name='low']/failure").get("message"), f"{degrees(slip):.3g}")
 
 
 @pytest.mark.exhaustive

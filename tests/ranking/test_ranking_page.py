@@ -1,30 +1,88 @@
-"""The page of a ranking in a browser: its matrix, and the runs that its cells open."""
+"""A small ranking that is driven: its tables, and its page in a browser, with the runs that cells open."""
 
 from __future__ import annotations
 
+import contextlib
+import io
+import json
 import shutil
+from math import degrees
 from pathlib import Path
+from types import SimpleNamespace
+from xml.etree import ElementTree
 
 import pytest
 
-from tests.ranking.test_ranking import SMALL
+from tests.command_line import status_of
+from tests.ranking.test_ranking import SMALL, rows
+from tests.refusals import mentions
 from tests.reports.browser import DESK, HELD, PHONE, Browser
 from tests.reports.flaws import flaws_in_print, inaccessible, looks
-from yawbench.cli import main
 from yawbench.ranking.ranking_page import result_of_threats
 
 RANKING = Path(__file__).parents[2] / "scenarios/proving_ground/ranking.yaml"
 
 
 @pytest.fixture(scope="module")
-def page(tmp_path_factory) -> Path:
-    """The page of two controllers in two conditions."""
+def driven(tmp_path_factory) -> SimpleNamespace:
+    """Two controllers in two conditions, one driven after the other; what was told and written meanwhile."""
     folder = tmp_path_factory.mktemp("ranking")
-    (folder / "small.yaml").write_text(SMALL)
-    with pytest.raises(SystemExit) as ended:
-        main(["rank", str(folder / "small.yaml"), "--out", str(folder / "out")])
-    assert not ended.value.code
-    return folder / "out" / "report.html"
+    file, out = folder / "small.yaml", folder / "out"
+    file.write_text(SMALL)
+    told, lacking = [], {}
+    for only in (("--only", "fuzzy_pid"), ()):
+        with contextlib.redirect_stderr(io.StringIO()) as said:
+            assert status_of("rank", file, "--out", out, "--jobs", 2, *only) == 0
+        told.append(said.getvalue())
+        lacking = lacking or {"rows": rows(out / "table.csv"), "page": (out / "report.html").read_text()}
+    return SimpleNamespace(file=file, out=out, told=told, **lacking)
+
+
+@pytest.fixture(scope="module")
+def page(driven) -> Path:
+    return driven.out / "report.html"
+
+
+def test_a_small_matrix_goes_on_where_it_was_and_shows_what_is_missing(driven, page, tmp_path, capsys):
+    assert mentions(driven.told[0], "ranked", "missing", "none")
+    assert mentions(driven.page, "build", "control")
+    assert [(one["entry"], one["place"]) for one in driven.rows] == [("fuzzy_pid", "1"), ("none", "")]
+    assert mentions(driven.told[1], "4 runs", "2", "finished")
+    out = driven.out
+    found = rows(out / "table.csv")
+    assert [(one["entry"], one["place"], one["passed"]) for one in found] == [
+        ("fuzzy_pid", "1", "2"), ("none", "1", "0"),
+    ]  # fmt: skip
+    assert found[0] == driven.rows[0]  # what has been made is not made again
+    cells = {(one["entry"], one["condition"]): one for one in rows(out / "cells.csv")}
+    assert {key: one["state"] for key, one in cells.items()} == {
+        ("fuzzy_pid", "dry"): "passed", ("fuzzy_pid", "low"): "passed",
+        ("none", "dry"): "failed", ("none", "low"): "failed",
+    }  # fmt: skip
+    assert 0 < float(found[0]["step_time [s]"]) < 0.005
+    held, free = (float(one["intervention [N.m.s]"]) for one in found)
+    assert free < 0.001 * held  # what the engine's lag leaves of the driver's force
+    assert len(rows(out / "runs.csv")) == 4
+    assert 'href="#cell?id=fuzzy-pid-in-low"' in page.read_text()
+    sides = {path.stem: path.read_text() for path in (out / "data").glob("*.js")}
+    assert set(sides) == {f"{entry}-in-{name}" for entry in ("fuzzy-pid", "none") for name in ("dry", "low")}
+    (low,) = (one for one in rows(out / "runs.csv") if (one["entry"], one["condition"]) == ("none", "low"))
+    content = json.loads(sides["none-in-low"].partition(", ")[2].rstrip(");\n"))
+    run, *_ = content["data"]["runs"]  # then the best of those that hold the car
+    assert {"x", "y", "yaw"} <= set(run["road"])  # what the car on the road needs
+    assert low["verdict"] in content["html"]
+    assert mentions(content["html"], "sine-with-dwell", "drive")
+    assert status_of("rank", driven.file, "--out", out, "--no-run", "--json") == 0
+    answer = json.loads(capsys.readouterr().out)
+    places = {entry["entry"]: entry["place"] for entry in answer["entries"]}
+    assert places == {"fuzzy_pid": 1, "none": 1}
+    assert (answer["page"], answer["folder"]) == (str(page), str(out))
+    judged = ("--no-run", "--strict", "--junit", tmp_path / "verdicts.xml")
+    assert status_of("rank", driven.file, "--out", out, *judged) == 1
+    root = ElementTree.parse(tmp_path / "verdicts.xml").getroot()
+    assert (root.get("tests"), root.get("failures"), root.get("errors")) == ("4", "2", "0")
+    slip = float(low["sideslip [rad]"])
+    assert mentions(root.find(".//testcase[@name='low']/failure").get("message"), f"{degrees(slip):.3g}")
 
 
 @pytest.mark.parametrize(("width", "colours"), looks(PHONE, DESK, narrow=True))

@@ -7,12 +7,12 @@ from pathlib import Path
 import pytest
 from lxml import html
 
+from tests.command_line import status_of
 from tests.fmu_copies import put_fmus
 from tests.refusals import each_mentions, mentions
 from tests.reports.browser import DESK, PHONE
 from tests.reports.flaws import check_whole, flaws, looks, open_all, size_without_samples
 from tests.reports.made_up import data_in, unpacked
-from yawbench.cli import main
 
 ROOT = Path(__file__).parents[2]
 UNITS = (
@@ -27,13 +27,10 @@ def page(tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("compare")
     put_fmus(folder / "fmus", components=UNITS)
     fuzzy = "controller_fuzzy_feedback"
-    with pytest.raises(SystemExit) as ended:
-        main([
-            "compare", str(ROOT / "scenarios/fuzzy_feedback/single_sine.yaml"), "--set", "stop_time=3",
-            "--swap", f"controller=controller_off,{fuzzy},{fuzzy}:rule_table=gentle",
-            "--fmus", str(folder / "fmus"), "--out", str(folder / "out"), "--format", "parquet",
-        ])  # fmt: skip
-    assert not ended.value.code
+    swaps = f"controller=controller_off,{fuzzy},{fuzzy}:rule_table=gentle"
+    given = ("--set", "stop_time=3", "--swap", swaps, "--fmus", folder / "fmus", "--format", "parquet")
+    scenario = ROOT / "scenarios/fuzzy_feedback/single_sine.yaml"
+    assert status_of("compare", scenario, *given, "--out", folder / "out") == 0
     return folder / "out" / "report.html"
 
 

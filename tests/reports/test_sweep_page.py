@@ -11,12 +11,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from tests.command_line import status_of
 from tests.reports.browser import DESK, PHONE, Browser
 from tests.reports.flaws import SCREENS, check_first_screen, flaws_in_print, inaccessible, looks
 from tests.reports.made_up import HALF_A_CAR
 from yawbench.bench.server import ResultsServer
 from yawbench.bench.sliders import Bench
-from yawbench.cli import main
 from yawbench.orchestrator.results.reader import load_results
 
 UNITS = ("driver_sine", "reference_single_track")
@@ -44,9 +44,7 @@ def sweep(tmp_path_factory, fmus):
     folder = tmp_path_factory.mktemp("sweep")
     (folder / "half.yaml").write_text(HALF_A_CAR)
     (folder / "sweep.yaml").write_text(SWEEP)
-    with pytest.raises(SystemExit) as ended:
-        main(["sweep", str(folder / "sweep.yaml"), "--out", str(folder / "out"), "--fmus", str(fmus)])
-    assert not ended.value.code
+    assert status_of("sweep", folder / "sweep.yaml", "--out", folder / "out", "--fmus", fmus) == 0
     out = folder / "out"
     rows = list(csv.DictReader((out / "table.csv").open()))
     return SimpleNamespace(page=out / "report.html", folder=out, rows=rows)
@@ -226,8 +224,7 @@ def test_runs_that_were_not_made_are_not_shown_as_failures(chromium, sweep, tmp_
     (tmp_path / "half.yaml").write_text(HALF_A_CAR)
     (tmp_path / "sweep.yaml").write_text(SWEEP)
     out = tmp_path / "out"
-    with pytest.raises(SystemExit):
-        main(["sweep", str(tmp_path / "sweep.yaml"), "--no-run", "--out", str(out), "--fmus", str(fmus)])
+    status_of("sweep", tmp_path / "sweep.yaml", "--no-run", "--out", out, "--fmus", fmus)
     opened(chromium, out / "report.html")
     cells = chromium.run(VIEW + "return view.cells().map((cell) => [view.label(cell), cell.within])")
     assert {tuple(cell) for cell in cells} == {("–", True)}
@@ -275,8 +272,7 @@ def test_the_page_of_a_hypercube_shows_all_its_points_where_they_lie(chromium, t
     (tmp_path / "half.yaml").write_text(HALF_A_CAR)
     (tmp_path / "sample.yaml").write_text(SAMPLE)
     out = tmp_path / "out"
-    with pytest.raises(SystemExit):
-        main(["sweep", str(tmp_path / "sample.yaml"), "--out", str(out), "--fmus", str(fmus)])
+    status_of("sweep", tmp_path / "sample.yaml", "--out", out, "--fmus", fmus)
     opened(chromium, out / "report.html")
     assert chromium.console() == []
     places = chromium.run(

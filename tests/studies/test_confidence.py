@@ -30,12 +30,6 @@ def test_the_interval_is_that_of_students_t_test():
     assert found.mean == pytest.approx(np.mean(numbers))
 
 
-def test_nineteen_in_twenty_intervals_hold_the_true_mean():
-    draws = np.random.Generator(np.random.PCG64(1)).normal(5.0, 2.0, (2000, 10))
-    held = [abs(found.mean - 5.0) <= found.half for found in map(interval, draws.tolist())]
-    assert np.mean(held) == pytest.approx(0.95, abs=0.015)
-
-
 def test_numbers_without_chance_in_them_have_no_interval():
     assert interval([0.1] * 10) == interval([0.1])
     assert interval([0.1]).half == 0.0
@@ -51,15 +45,6 @@ def test_bounds_of_a_share_are_those_of_the_exact_binomial_test(count, number):
 
     theirs = stats.binomtest(count, number).proportion_ci(0.95, method="exact")
     assert share_bounds(count, number) == pytest.approx(tuple(theirs))
-
-
-def test_bounds_of_a_share_hold_it_at_least_as_often_as_they_say():
-    chance = np.random.default_rng(1)
-    for share in (0.03, 0.1, 0.5):
-        counts = chance.binomial(30, share, 2000)
-        known = {count: share_bounds(int(count), 30) for count in set(counts)}
-        held = [known[count].low <= share <= known[count].high for count in counts]
-        assert np.mean(held) >= 0.95 - 0.01
 
 
 def test_29_of_29_and_45_of_46_say_that_fewer_than_a_tenth_fail():
@@ -138,9 +123,8 @@ def test_the_jackknife_of_a_mean_is_the_interval_of_student():
     assert (value[0], half[0]) == pytest.approx(interval(list(numbers)))
 
 
-@pytest.mark.parametrize(("spread", "correlation"), [(0.3, 0.5), (0.6, 0.8), (1.0, 0.95)])
-def test_of_ratios_of_ten_pairs_the_jackknife_covers_what_a_bootstrap_does_not(spread, correlation):
-    chance = np.random.default_rng(7)
+def test_of_ratios_of_ten_pairs_the_jackknife_covers_what_a_bootstrap_does_not():
+    chance, spread, correlation = np.random.default_rng(7), 1.0, 0.95
     mixed = np.linalg.cholesky(spread**2 * np.array([[1.0, correlation], [correlation, 1.0]]))
 
     def ratio(some):
@@ -155,28 +139,3 @@ def test_of_ratios_of_ten_pairs_the_jackknife_covers_what_a_bootstrap_does_not(s
     by_jackknife, by_bootstrap = held.mean(axis=0)
     assert 0.9 <= by_jackknife <= 0.97
     assert by_bootstrap < by_jackknife - 0.02
-
-
-@pytest.mark.parametrize(("of_laps", "of_places"), [(0.3, 0.4), (0.35, 0.7), (0.5, 0.8)])
-def test_of_five_laps_over_the_same_bends_student_covers_and_pieces_tell_nothing_of_other_bends(
-    of_laps, of_places
-):
-    chance = np.random.default_rng(2)
-    laps, places = 5, 10
-
-    def squares(bends, number):
-        lap = np.exp(chance.normal(0.0, of_laps, (number, 1)))
-        return bends * lap * np.exp(chance.normal(0.0, of_places, (number, places)))
-
-    held = np.zeros((500, 2), dtype=bool)
-    for k in range(len(held)):
-        bends = np.exp(chance.normal(0.0, 1.5, places))
-        pieces = squares(bends, laps)
-        mean, half = interval(list(np.sqrt(pieces.mean(axis=1))))
-        truth = np.sqrt(squares(bends, 1000).mean(axis=1)).mean()
-        resampled = pieces.ravel()[chance.integers(pieces.size, size=(300, pieces.size))].mean(axis=1)
-        low, high = np.quantile(resampled, [0.025, 0.975])
-        held[k] = abs(mean - truth) <= half, low <= np.exp((1.5**2 + of_laps**2 + of_places**2) / 2) <= high
-    same_bends, other_bends = held.mean(axis=0)
-    assert 0.91 <= same_bends <= 0.97
-    assert other_bends < 0.65

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import json
 
 import pytest
 
+from tests.command_line import status_of
 from tests.commands.test_batch_commands import SCENARIO, STUDY
 from tests.refusals import mentions
 from yawbench.studies.differences import differences, recorded_in
@@ -21,17 +24,20 @@ metrics:
 """
 
 
-@pytest.fixture
-def made(fmus, tmp_path, monkeypatch, yawbench):
-    """Make a study or a sweep with other options; return its folder."""
+@pytest.fixture(scope="module")
+def made(fmus, tmp_path_factory):
+    """Make a study or a sweep, once with the same options and levels; return its folder."""
+    folder = tmp_path_factory.mktemp("made")
     for name, text in {"half": SCENARIO, "study": STUDY, "sweep": SWEEP}.items():
-        (tmp_path / f"{name}.yaml").write_text(text)
-    monkeypatch.chdir(tmp_path)
+        (folder / f"{name}.yaml").write_text(text)
 
-    def make(kind: str, out: str, *options: str):
-        status, _, said = yawbench(kind, f"{kind}.yaml", "--fmus", fmus, "--out", out, *options)
-        assert status == 0, said
-        return tmp_path / out
+    def make(kind: str, out: str, *options: str, levels: str = "[10, 20]"):
+        if not (folder / out).exists():
+            (folder / "sweep.yaml").write_text(SWEEP.replace("[10, 20]", levels))
+            file = folder / f"{kind}.yaml"
+            with contextlib.redirect_stdout(io.StringIO()):
+                assert status_of(kind, file, "--fmus", fmus, "--out", folder / out, *options) == 0
+        return folder / out
 
     return make
 
@@ -44,7 +50,7 @@ def test_a_study_repeated_is_identical(made, yawbench):
 
 def test_numbers_differ_by_their_share_and_verdicts_by_their_words(made, yawbench):
     first = made("study", "first")
-    second = made("study", "second", "--set", "driver.amplitude=1e-7", "--set", "inputs.sideslip=0")
+    second = made("study", "slower", "--set", "driver.amplitude=1e-7", "--set", "inputs.sideslip=0")
     ours, theirs = recorded_in(first), recorded_in(second)
     found = differences(ours, theirs)
     (pair,) = found.numbers
@@ -63,16 +69,15 @@ def test_numbers_differ_by_their_share_and_verdicts_by_their_words(made, yawbenc
     assert answer["identical"] is False and answer["numbers"][0]["second"] == pair.second
 
 
-def test_runs_of_a_sweep_are_told_apart_by_their_levels(made, tmp_path, yawbench):
-    first = made("sweep", "first")
-    (tmp_path / "sweep.yaml").write_text(SWEEP.replace("[10, 20]", "[20, 30]"))
-    found = differences(recorded_in(first), recorded_in(made("sweep", "second")))
+def test_runs_of_a_sweep_are_told_apart_by_their_levels(made):
+    first, second = made("sweep", "swept"), made("sweep", "faster", levels="[20, 30]")
+    found = differences(recorded_in(first), recorded_in(second))
     assert (found.compared, found.numbers) == (1, [])
     assert found.statuses == [("10.0", "completed", ""), ("30.0", "", "completed")]
 
 
 def test_what_has_nothing_in_common_cannot_be_compared(made, yawbench):
-    status, _, said = yawbench("diff", made("study", "first"), made("sweep", "second"))
+    status, _, said = yawbench("diff", made("study", "first"), made("sweep", "swept"))
     assert status == 1 and mentions(said, "nothing", "compared")
 
 

@@ -126,14 +126,6 @@ from yawbench.studies.jobs import execute
 from tests.studies.test_jobs import jobs, tell_and_wait
 execute(jobs(Path(sys.argv[1]), "waits"), run=tell_and_wait)
 """
-SHARING = """
-import sys
-from pathlib import Path
-from yawbench.foundation.workers import Pool
-from tests.studies.test_jobs import jobs, tell_and_wait
-with Pool(2) as pool:
-    pool.map(tell_and_wait, jobs(Path(sys.argv[1]), "waits"))
-"""
 
 
 def tell_and_wait(job):
@@ -143,10 +135,9 @@ def tell_and_wait(job):
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="needs Linux to tell a process that its parent has ended")
-@pytest.mark.parametrize("program", [CALLER, SHARING], ids=["runs", "work"])
-def test_processes_end_without_a_word_when_their_caller_is_killed(program, tmp_path):
+def test_processes_end_without_a_word_when_their_caller_is_killed(tmp_path):
     os.mkfifo(tmp_path / "begun")
-    command = [sys.executable, "-c", program, str(tmp_path)]
+    command = [sys.executable, "-c", CALLER, str(tmp_path)]
     caller = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     (tmp_path / "begun").read_bytes()
     caller.kill()

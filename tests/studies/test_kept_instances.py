@@ -14,9 +14,7 @@ from pathlib import Path
 import pytest
 
 from tests.changed import changed
-from tests.conftest import build_here
-from tests.orchestrator.test_isolation import STEP
-from yawbench.commands.new import begin
+from tests.conftest import build_controller_in_c
 from yawbench.fmus.archive import WANTED, is_native
 from yawbench.orchestrator.master import fmi
 from yawbench.orchestrator.master.log import Log
@@ -46,15 +44,10 @@ def foreign(tmp_path_factory):
     if shutil.which("cc") is None:
         pytest.skip("there is no C compiler")
 
-    def build(name, act):
-        folder = tmp_path_factory.mktemp(name)
-        for path, text in begin("controller", name, "c", in_checkout=True).files.items():
-            file = folder / path
-            file.parent.mkdir(parents=True, exist_ok=True)
-            file.write_text(text.replace(STEP, f"{act}\n    {STEP}") if file.suffix == ".c" else text)
-        return build_here(folder / "components" / "controllers" / name, folder / "built")
-
-    return build("idea", ""), build("broken", "if (t > 0.0195) { *(volatile int *)8 = 0; }")
+    acts = {"idea": "", "broken": "if (t > 0.0195) { *(volatile int *)8 = 0; }"}
+    return tuple(
+        build_controller_in_c(tmp_path_factory.mktemp(name), act, name) for name, act in acts.items()
+    )
 
 
 def settings(fmus: Path, foreign: tuple[Path, Path], folder: Path) -> list[dict]:

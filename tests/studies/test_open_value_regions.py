@@ -11,8 +11,8 @@ import pytest
 from lxml import html
 
 from tests.checkout import ROOT
+from tests.command_line import status_of
 from tests.refusals import mentions, refused
-from yawbench.cli import main
 from yawbench.foundation.errors import Diagnostic, ScenarioError
 from yawbench.metrics.expressions import MetricValue
 from yawbench.metrics.verdict import Status, Verdict, all_of, compare, not_judged, worst
@@ -312,9 +312,7 @@ def test_study_makes_the_runs_of_the_region_once_and_quick_leaves_them_out(
     monkeypatch.chdir(tmp_path)
 
     def study(*options: str) -> tuple[str, str, dict]:
-        with pytest.raises(SystemExit) as ended:
-            main(["study", "study.yaml", "--out", "o", "--fmus", str(fmus), *options])
-        assert not ended.value.code
+        assert status_of("study", "study.yaml", "--out", "o", "--fmus", fmus, *options) == 0
         said = capsys.readouterr()
         return said.out, said.err, json.loads((tmp_path / "o/experiment.json").read_text("utf-8"))
 

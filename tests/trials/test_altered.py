@@ -20,16 +20,16 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Folder]:
     yield base(tmp_path_factory.mktemp("altered") / "base")
 
 
+@pytest.mark.exhaustive  # tests/commands/test_hostile_files.py and orchestrator/test_one_car.py alter files
 @pytest.mark.parametrize("group", GROUPS)
-@pytest.mark.sampled(1)
 def test_altered_values_are_computed_with_or_answered_in_a_sentence(group: str, folder: Folder) -> None:
     counts, notes = trial(group, [0, 1, 2], 1, folder, 1)
     assert notes == []
     assert sum(counts.values()) == 3
 
 
+@pytest.mark.exhaustive  # tests/orchestrator/test_recorder.py and test_formats.py fill disks
 @pytest.mark.parametrize("command", COMMANDS)
-@pytest.mark.sampled(1)
 def test_a_command_on_a_full_disk_fails_in_a_sentence_and_the_next_call_gives_all(
     command: str, tmp_path: Path
 ) -> None:

@@ -13,8 +13,8 @@ from yawbench.fmus.build import build_all
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs signals")
+@pytest.mark.exhaustive  # tests/orchestrator/test_folder.py lets runs die, studies/test_sweep.py sweeps
 @pytest.mark.parametrize("command", COMMANDS)
-@pytest.mark.sampled(1)
 def test_a_killed_command_passes_nothing_half_for_whole_and_the_next_call_repairs_all(
     command: str, tmp_path: Path
 ) -> None:

@@ -6,9 +6,12 @@ import pickle
 import subprocess
 import sys
 from pathlib import Path
+from typing import get_args
 
 import yawbench as yb
 from tests.refusals import refused
+from yawbench.orchestrator.fault_kinds import KINDS, FaultName
+from yawbench.proving_ground.standard_tests import TESTS, TestName
 
 HEAVY = (
     "numpy",
@@ -50,3 +53,8 @@ def test_public_classes_can_be_pickled():
     classes = [value for name in yb.__all__ if isinstance(value := getattr(yb, name), type)]
     assert len(classes) >= 14
     assert all(pickle.loads(pickle.dumps(one)) is one for one in classes)
+
+
+def test_literals_name_all_kinds_of_faults_and_all_standard_tests():
+    assert get_args(FaultName) == (*KINDS,)
+    assert get_args(TestName) == (*TESTS,)

@@ -16,10 +16,10 @@ import numpy as np
 import pytest
 
 import yawbench as yb
+from tests.command_line import status_of
 from tests.refusals import mentions, refused, texts_of
 from tests.reports.made_up import unpacked
 from yawbench._controller import PythonComponent
-from yawbench.cli import main
 from yawbench.components.controllers.fnn import Fnn
 from yawbench.foundation.errors import warnings_in
 
@@ -74,9 +74,7 @@ def test_every_public_name_is_there():
 
 def test_a_run_has_the_numbers_that_the_command_line_writes(base, run, tmp_path):
     main_path = str(base.path)
-    with pytest.raises(SystemExit) as end:
-        main(["run", main_path, "--set", "stop_time=1.6", "--out", str(tmp_path / "cli")])
-    assert end.value.code == 0
+    assert status_of("run", main_path, "--set", "stop_time=1.6", "--out", tmp_path / "cli") == 0
     assert equal(run, yb.open(tmp_path / "cli"))
 
 
@@ -603,7 +601,7 @@ def test_what_cannot_stand_for_a_controller_is_refused_in_a_sentence(base, given
         base.swap(controller=given)
 
 
-def test_unknown_units_places_and_scenarios_are_refused_with_a_guess(base):
+def test_unknown_units_and_places_are_refused_with_a_guess(base):
     with refused(yb.ScenarioError, "instance-unknown", names=("'controler'", "'controller'")) as caught:
         base.swap(controler="controller_off")
     assert (caught.value.file, caught.value.line) == (base.path, None)
@@ -611,8 +609,6 @@ def test_unknown_units_places_and_scenarios_are_refused_with_a_guess(base):
         yb.YawbenchError, "parameter-unknown", names=("plant.mas=3", "plant_seven_dof", "'mas'", "'mass'")
     ):
         base.set({"plant.mas": 3}).plan()
-    with refused(yb.ScenarioError, "scenario-unknown", names=("'fnn_sideslip/25mp'", "'fnn_sideslip/25mps'")):
-        yb.load("fnn_sideslip/25mp")
 
 
 def test_an_output_of_the_wrong_length_ends_the_run_with_a_sentence(base):
@@ -658,18 +654,11 @@ def test_what_a_run_cannot_be_evaluated_with_is_said_in_a_sentence(run, test, an
             ("vehicle.mass", "number"),
         ),
         (lambda base, run: base.run(progress=3), TypeError, ("progress", "function", "total")),
-        (lambda base, run: run[0], TypeError, ("column", "text")),
-        (lambda base, run: run.metric(3), TypeError, ("metric", "text")),
         (lambda base, run: run.metric("peak(sideslip)", (1,)), TypeError, ("window", "pair", "times")),
         (
             lambda base, run: run.metric("peak(sideslip)", ("0", "1")),
             TypeError,
             ("0", "number", "window"),
-        ),
-        (
-            lambda base, run: run.plot("yawrate"),
-            yb.ScenarioError,
-            ("panel yawrate:", "'yaw_rate'"),
         ),
         (
             lambda base, run: base.set({"stop_time": 1e9, "step_size": 1e-9}),
@@ -682,24 +671,9 @@ def test_what_a_run_cannot_be_evaluated_with_is_said_in_a_sentence(run, test, an
             ("16 GB", "kept", "memory"),
         ),
         (
-            lambda base, run: base.set({"plant.mas": 1200}),
-            yb.ScenarioError,
-            ("set plant.mas=1200", "'mass'"),
-        ),
-        (
             lambda base, run: base.set({"vehicle.mass": "3 m", "driver.amplitude": "1 kg"}),
             yb.ScenarioError,
             ("set driver.amplitude=1 kg", "deg"),
-        ),
-        (
-            lambda base, run: base.set({"inputs.friktion*": 0.3}),
-            yb.ScenarioError,
-            ("set inputs.friktion*=0.3", "'friction_*'"),
-        ),
-        (
-            lambda base, run: base.swap(controller="controller_nowhere"),
-            yb.ModelDescriptionError,
-            ("controller_nowhere",),
         ),
         (
             lambda base, run: base.swap(controller=lambda yawrate: 0.0),
