@@ -69,7 +69,7 @@ def in_one_sentence(said, arguments, names):
         ((*RUN, "--swap", "controller"), ["--swap INSTANCE=FMU"]),
         ((*RUN, "--swap", r"controller=C:\units\x.fmu"), [r'C:\units\x.fmu', "/"]),
         ((*RUN, "--out", "a_file"), ["a_file", "--out"]),
-        ((*RUN, "--format", "excel"), ["--format excel", "csv", "mf4"]),
+        ((*RUN, "--format", "excel"), ["--format excel", "csv", "parquet"]),
         ((*RUN, "--fmus", "nowhere"), ["--fmus nowhere"]),
         ((*RUN, "--call-limit", "5"), ["--call-limit", "--isolate"]),
         (("plot", "nowhere"), ["nowhere", "yawbench run SCENARIO"]),
