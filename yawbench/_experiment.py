@@ -13,6 +13,7 @@ from yawbench.events.kinds import WarningWatch
 from yawbench.fmus.fmu import Value
 from yawbench.foundation.errors import Diagnostic, ResultsError, ScenarioError
 from yawbench.foundation.messages import hint, short
+from yawbench.foundation.progress import bar
 from yawbench.orchestrator.master.fmi import open_instance
 from yawbench.orchestrator.master.run_lifecycle import OpenInstance
 from yawbench.orchestrator.master.simulate import simulate_in_memory
@@ -37,7 +38,6 @@ from . import arguments
 from ._controller import PythonComponent
 from ._dataset import dataset
 from ._distributions import Drawn
-from ._progress import bar
 from ._run import Run, shown_in_notebooks
 from ._run_many import make_all, planner_of
 from ._scenario import Scenario, load, warn

@@ -23,6 +23,7 @@ from yawbench.foundation.errors import (
     warnings_in,
 )
 from yawbench.foundation.messages import hint, short
+from yawbench.foundation.progress import bar
 from yawbench.orchestrator.fault_kinds import FaultList, FaultName
 from yawbench.orchestrator.master.simulate import simulate_in_memory
 from yawbench.orchestrator.plan import Override, Plan
@@ -37,7 +38,6 @@ from yawbench.vocabulary.roles import role_of
 from . import arguments
 from ._controller import ControllerLike, PythonComponent
 from ._known_fmus import KnownFmus
-from ._progress import bar
 from ._run import Run
 from ._run_many import Opened, opener_of, planner_of
 from .planner import Planner

@@ -9,12 +9,13 @@ from __future__ import annotations
 import contextlib
 import os
 import sys
+import textwrap
 import threading
 from collections.abc import Iterator
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
-from yawbench.foundation.messages import printable
+from .messages import printable
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -24,6 +25,8 @@ DELAY = 2.0
 """Time [s] before a bar appears. Chosen: shorter calls need none."""
 SWITCH = "YAWBENCH_PROGRESS"
 """Environment variable; "off" disables bars."""
+BESIDE = 36
+"""Columns of the terminal reserved for the bar and its numbers."""
 _shown = threading.Lock()
 """Lock of the call whose bar is shown; calls within it show none."""
 
@@ -55,7 +58,8 @@ class Bar:
         from rich.progress import Progress
 
         display = Progress(console=on, transient=True)
-        title = printable(self._title).replace("[", r"\[")
+        shown = textwrap.shorten(self._title, max(10, on.width - BESIDE), placeholder="…")
+        title = printable(shown).replace("[", r"\[")
         self._task = display.add_task(title, total=self._total, completed=self._done)
         display.start()
         self._display = display
