@@ -186,13 +186,13 @@ class Scenario:
         Raises:
             ScenarioError: a target or value is invalid; lists all errors.
         """
-        loaded = self._loaded
-        wrong = {change: self._known_fmus.problem(change, loaded) for change in changes}
-        errors = [
-            Diagnostic(code_of(error), str(error), location=Location(target=str(change)))
-            for change, error in wrong.items()
-            if error is not None
-        ]
+        loaded, errors = self._loaded, []
+        for change in changes:
+            try:
+                self._known_fmus.check(change, loaded)
+            except ValueError as error:  # noqa: PERF203 - all errors are collected
+                where = Location(target=str(change))
+                errors.append(Diagnostic(code_of(error), str(error), location=where))
         if errors:
             raise ScenarioError(errors)
 
