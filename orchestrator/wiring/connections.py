@@ -216,9 +216,7 @@ class Connector:
         if any(self._outputs[s].keys() & self._inputs[t].keys() for s, t in ends):
             return
         if self._scenario.replaced.keys() & {*sources, *targets}:
-            self._system.note(
-                "left-out-after-swap", f"{dotted(key)} is left out: no names are equal any more"
-            )
+            self._system.left_out(dotted(key), "no names are equal any more")
             return
         from_names, to_names = listed(sources, last="or"), listed(targets, last="or")
         self._report(
@@ -250,10 +248,7 @@ class Connector:
     def _no_such(self, key: KeyPath, instance: str, pattern: str, kind: str) -> None:
         """Report a pattern without a match; only note it if the replaced FMU has a match."""
         if self._system.had([instance], pattern, kind):
-            self._system.note(
-                "left-out-after-swap",
-                f"{dotted(key[:2])} is left out: {instance} has no {kind} {pattern!r} any more",
-            )
+            self._system.left_out(dotted(key[:2]), f"{instance} has no {kind} {pattern!r} any more")
             return
         variable = self._fmus[instance].variables.get(pattern)
         if variable is not None:

@@ -128,7 +128,7 @@ def run(
         with (
             _seen(plan, live) as watch,
             _listening(log) as hear,
-            bar(title, wanted=shows_bars() and not live) as shown,
+            bar(title, wanted=shows_bars() and not live, ticking=False) as shown,
             opener_of(plan, options.limit) as opener,
         ):
             info = simulate(
