@@ -70,6 +70,8 @@ LogOption = Annotated[
 
 SHOWN = 5
 """Number of warnings shown; all are in run.json."""
+THREADS = "OPENBLAS_NUM_THREADS"
+"""Environment variable that the library of NumPy reads when it is loaded: its threads."""
 FASTEST = 1e6
 """Largest pace [1]; chosen: no run is as fast."""
 
@@ -92,7 +94,8 @@ def run(
     appended to the name. They replace those of an earlier run, but a failed run never replaces a
     completed one: its results go to failed/ in that folder.
     """
-    from yawbench.orchestrator.master.compiled_loop import slower_because
+    with _without_threads():
+        from yawbench.orchestrator.master.compiled_loop import slower_because
     from yawbench.orchestrator.master.isolation import opener_of
     from yawbench.orchestrator.master.log import STATUS, WARNING
     from yawbench.orchestrator.master.simulate import simulate
@@ -170,6 +173,23 @@ def run(
         output.answer(
             metrics={name: {"value": value.number, "unit": value.unit} for name, value in numbers.items()}
         )
+
+
+@contextlib.contextmanager
+def _without_threads() -> Iterator[None]:
+    """Have NumPy, if the block imports it, start no threads for products of large matrices.
+
+    A run has none, and starting them takes a twentieth of the time of a short one. What FMUs load later
+    starts its own, and whoever sets the variable has what it says.
+    """
+    if THREADS in os.environ:
+        yield
+        return
+    os.environ[THREADS] = "1"
+    try:
+        yield
+    finally:
+        del os.environ[THREADS]
 
 
 @contextlib.contextmanager
