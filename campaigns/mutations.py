@@ -369,7 +369,7 @@ def prepare(box: Sandbox, groups: set[str]) -> None:
     if "results" in groups:
         made += [
             ["run", str(scenario), "--format", f, "--out", str(cases / f"base_{f}")]
-            for f in ("csv", "parquet", "mf4")
+            for f in ("csv", "parquet")
         ]
     for arguments in made:
         subprocess.run(

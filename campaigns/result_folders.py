@@ -215,7 +215,7 @@ def _both(alter: Callable[[Path], None], status: str) -> Callable[[Path], None]:
 
 NAMES = (
     "run.json", "results.csv", "run.json.part", "results.csv.part", "run.json.new", LOCK_FILE, "failed",
-    "results.parquet", "results.mf4", "results.parquet.part", "overview.svg", "view.html",
+    "results.parquet", "results.parquet.part", "overview.svg", "view.html",
     "evaluation.json",
 )  # fmt: skip
 """Files that a command may look for in a folder."""

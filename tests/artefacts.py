@@ -135,16 +135,6 @@ def _parquet(file: Path) -> dict[str, str]:
     return {"": _columns(read), "#units": _dumped(units)}
 
 
-def _mdf(file: Path) -> dict[str, str]:
-    from asammdf import MDF  # an optional dependency
-
-    with MDF(file) as opened:
-        frame = opened.to_dataframe(time_from_zero=False)
-        units = {name: opened.get(name).unit for name in frame.columns}
-    columns = {"time": frame.index.to_numpy()} | {name: frame[name].to_numpy() for name in frame.columns}
-    return {"": _table(columns), "#units": _dumped(units)}
-
-
 def _page(file: Path) -> dict[str, str]:
     tree = html.parse(str(file), html.HTMLParser(encoding="utf-8"))
     rows = [[_squeezed(cell.itertext()) for cell in row.iterchildren("td", "th")] for row in tree.iter("tr")]
@@ -192,7 +182,7 @@ OF_WORDS: dict[str, Reader] = {
 }  # fmt: skip
 """Kinds of files whose texts are masked."""
 OF_VALUES: dict[str, Reader] = {
-    ".parquet": _parquet, ".mf4": _mdf, ".svg": _figure,
+    ".parquet": _parquet, ".svg": _figure,
     ".png": _nothing,  # the figure that is also there as SVG
 }  # fmt: skip
 """Kinds whose texts are made of values, or hold hashes of them."""

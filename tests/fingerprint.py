@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import argparse
 import gzip
-import importlib.util
 import json
 import os
 import re
@@ -151,9 +150,6 @@ class Comparison(NamedTuple):
 def jobs(scenarios: Path, quick: bool = False) -> list[Job]:
     """Return all that is run, the longest first."""
     every = [*_scenario_jobs(scenarios), *_experiment_jobs(quick), *_other_jobs()]
-    if importlib.util.find_spec("asammdf"):
-        run = ("run", BASE, *SHORT, "--format", "mf4", "--out", "out/mf4")
-        every.append(Job("mf4", (run,), 3, printed=False))
     return sorted((job for job in every if job.quick or not quick), key=lambda job: -job.cost)
 
 

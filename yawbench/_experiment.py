@@ -13,6 +13,7 @@ from yawbench.events.kinds import WarningWatch
 from yawbench.fmus.fmu import Value
 from yawbench.foundation.errors import Diagnostic, ResultsError, ScenarioError
 from yawbench.foundation.messages import hint, listed, short
+from yawbench.foundation.progress import bar
 from yawbench.metrics import expressions
 from yawbench.orchestrator.master.fmi import open_instance
 from yawbench.orchestrator.master.run_lifecycle import OpenInstance
@@ -38,7 +39,6 @@ from . import arguments
 from ._controller import PythonComponent
 from ._dataset import dataset
 from ._distributions import Drawn
-from ._progress import bar
 from ._run import Run, shown_in_notebooks
 from ._run_many import make_all, planner_of
 from ._scenario import Scenario, load, warn

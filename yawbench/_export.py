@@ -29,13 +29,13 @@ from yawbench.fmus.source_files import Parts, Sources, UserModules
 from yawbench.fmus.staging import staged
 from yawbench.foundation.errors import BuildError, ScenarioError, YawbenchWarning
 from yawbench.foundation.messages import listed, short
+from yawbench.foundation.progress import bar
 from yawbench.vocabulary.roles import ROLES
 
 from . import _parameters, arguments
 from ._controller import ControllerLike, PythonComponent
 from ._export_source import Cut, literal, refuse
 from ._parameters import ProgramParameters
-from ._progress import bar
 
 STEPS, FEW, STEP = 400, 60, 0.001
 """Number of steps of an FMU's comparison with its program, with other parameters, and step size [s]."""

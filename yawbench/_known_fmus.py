@@ -42,15 +42,7 @@ class KnownFmus:
                 located = [replace(diagnostic, location=where) for diagnostic in error.diagnostics]
                 raise ModelDescriptionError(located) from None
 
-    def problem(self, change: Override, scenario: LoadedScenario) -> ValueError | None:
-        """Return why an override cannot be used, None if nothing is known against it."""
-        try:
-            self._check(change, scenario)
-        except ValueError as error:
-            return error
-        return None
-
-    def _check(self, change: Override, scenario: LoadedScenario) -> None:
+    def check(self, change: Override, scenario: LoadedScenario) -> None:
         """Check the name and the value of an override of a parameter, an input or a quantity of the car.
 
         Raises:

@@ -15,10 +15,11 @@ from yawbench.orchestrator.results.file_formats import RESULTS_FILE
 from yawbench.orchestrator.results.reader import found_runs, load_results
 from yawbench.orchestrator.results.run_folder import PART
 from yawbench.orchestrator.results.run_record import RUN_FILE, RunStatus
+from yawbench.orchestrator.scenario.catalogue import YAML
 
 from . import arguments
 from ._dataset import dataset
-from ._run import Run, measured, shown_in_notebooks
+from ._run import Run, drawn, measured
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -48,7 +49,7 @@ def open(folder: str | Path) -> Run | RecordedRuns:
         ScenarioError: the measurement file, or a recording that it names, cannot be used.
     """
     place = arguments.path(folder, "folder")
-    if place.suffix in (".yaml", ".yml") and place.is_file():
+    if place.suffix in YAML and place.is_file():
         return measured(place)
     if place.is_dir() and not any((place / name).exists() for name in (RUN_FILE, f"{RUN_FILE}{PART}")):
         tables = {file.stem: file for file in sorted(place.glob("*.csv")) if file.name != RESULTS_FILE}
@@ -137,18 +138,10 @@ class RecordedRuns:
             ScenarioError: a signal was not recorded.
             ResultsError: no results were kept, or no recorded signal can be drawn.
         """
-        from yawbench.figures.display import LabelledRun
-        from yawbench.figures.plots import OVERVIEW, draw
-
-        from .figures import panels as drawing
-
-        wanted = arguments.texts(panels, "panels")
-        title = None if title is None else arguments.text(title, "title")
         if not self.runs:
             raise ResultsError(f"{self.folder}: no results were kept", code="results-missing")
-        runs = [LabelledRun(name, run.results) for name, run in self.runs.items()]
-        drawing.check_panels(runs, wanted, option="panel ")
-        return shown_in_notebooks(draw(runs, wanted or OVERVIEW, title=title or self.folder.name))
+        runs = {name: run.results for name, run in self.runs.items()}
+        return drawn(runs, panels, self.folder.name if title is None else title)
 
     def __repr__(self) -> str:
         held = listed(list(self.files), last="and") or "no table"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import io
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -267,16 +267,7 @@ class Run:
             ScenarioError: a signal was not recorded.
             ResultsError: no recorded signal can be drawn.
         """
-        from yawbench.figures.display import LabelledRun
-        from yawbench.figures.plots import draw, overview_of
-
-        from .figures import panels as drawing
-
-        wanted = arguments.texts(panels, "panels")
-        title = None if title is None else arguments.text(title, "title")
-        runs = [LabelledRun(self.title, *filtered_alike([self.results]))]
-        drawing.check_panels(runs, wanted, option="panel ")
-        return shown_in_notebooks(draw(runs, wanted or overview_of(runs), title=title))
+        return drawn({self.title: self.results}, panels, title)
 
     def save(self, folder: str | Path, *, format: str = "csv") -> Path:
         """Write results and run.json, as `yawbench run` does, and return the folder.
@@ -312,6 +303,20 @@ class Run:
         rows = "".join(f"<tr><td>{escape(title)}</td><td>{escape(value)}</td></tr>" for title, value in cells)
         noted = "".join(f"<br>⚠ {escape(str(warning))}" for warning in warnings_in(self.diagnostics))
         return f"<b>{escape(self.title)}</b>{changed}{noted}<table>{rows}</table>"
+
+
+def drawn(runs: Mapping[str, Results], panels: Sequence[str], title: str | None) -> Figure:
+    """Return a figure of runs by their labels, see `Run.plot`."""
+    from yawbench.figures.display import LabelledRun
+    from yawbench.figures.plots import draw, overview_of
+
+    from .figures.panels import check_panels
+
+    wanted = arguments.texts(panels, "panels")
+    title = None if title is None else arguments.text(title, "title")
+    labelled = [*map(LabelledRun, runs, filtered_alike([*runs.values()]))]
+    check_panels(labelled, wanted, option="panel ")
+    return shown_in_notebooks(draw(labelled, wanted or overview_of(labelled), title=title))
 
 
 def shown_in_notebooks(figure: Figure) -> Figure:

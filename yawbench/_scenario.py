@@ -23,6 +23,7 @@ from yawbench.foundation.errors import (
     warnings_in,
 )
 from yawbench.foundation.messages import hint, short
+from yawbench.foundation.progress import bar
 from yawbench.orchestrator.fault_kinds import FaultList, FaultName
 from yawbench.orchestrator.master.simulate import simulate_in_memory
 from yawbench.orchestrator.plan import Override, Plan
@@ -37,7 +38,6 @@ from yawbench.vocabulary.roles import role_of
 from . import arguments
 from ._controller import ControllerLike, PythonComponent
 from ._known_fmus import KnownFmus
-from ._progress import bar
 from ._run import Run
 from ._run_many import Opened, opener_of, planner_of
 from .planner import Planner
@@ -186,13 +186,13 @@ class Scenario:
         Raises:
             ScenarioError: a target or value is invalid; lists all errors.
         """
-        loaded = self._loaded
-        wrong = {change: self._known_fmus.problem(change, loaded) for change in changes}
-        errors = [
-            Diagnostic(code_of(error), str(error), location=Location(target=str(change)))
-            for change, error in wrong.items()
-            if error is not None
-        ]
+        loaded, errors = self._loaded, []
+        for change in changes:
+            try:
+                self._known_fmus.check(change, loaded)
+            except ValueError as error:  # noqa: PERF203 - all errors are collected
+                where = Location(target=str(change))
+                errors.append(Diagnostic(code_of(error), str(error), location=where))
         if errors:
             raise ScenarioError(errors)
 

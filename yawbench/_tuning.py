@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from yawbench.fmus.fmu import Value
 from yawbench.foundation.errors import Diagnostic, ResultsError, ScenarioError
 from yawbench.foundation.messages import counted, listed
+from yawbench.foundation.progress import bar
 from yawbench.orchestrator.scenario.schema_validation import made
 from yawbench.studies.axes import AxisSpec
 from yawbench.studies.claim_schema import DerivedSpec, MetricSource, MetricSpec
@@ -25,7 +26,6 @@ from yawbench.studies.tuning import TunedLaw, columns_of, history_figure, search
 from . import arguments
 from ._controller import PythonComponent
 from ._experiment import executed, numbers_of
-from ._progress import bar
 from ._run import shown_in_notebooks
 from ._scenario import Scenario, warn
 

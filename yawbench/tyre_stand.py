@@ -185,8 +185,6 @@ def cornering_stiffness(tyres: Instance, loads: Mapping[str, float]) -> dict[str
         SimulationError: the FMU failed.
         ValueError: it cannot be stepped outside the run.
     """
-    pass  # the module imports NumPy, which most plans do not need
-
     if tyres.fmu.once_per_process:
         raise ValueError(f"{tyres.fmu.name} can be instantiated only once per process")
     inputs: dict[str, Value] = {

@@ -99,13 +99,16 @@ class Log:
             return
         if self._hear is not None:
             self._hear(message)
-        if status == OK:
-            return
-        self._counts[instance] += 1
-        if self._counts[instance] > KEPT and category not in (MASTER, PROCESS, KILLED):
-            self.drop(1)
-            return
-        self.messages.append(message)
+        if status != OK:
+            self._counts[instance] += 1
+            if self._counts[instance] > KEPT and category not in (MASTER, PROCESS, KILLED):
+                self.drop(1)
+                return
+            self.messages.append(message)
+        self._relay(message)
+
+    def _relay(self, message: Message) -> None:
+        """Pass on a message that is kept, or asked for: nothing here."""
 
     def drop(self, count: int) -> None:
         """Count messages that are not kept."""
@@ -156,16 +159,7 @@ class LogRelay(Log):
         self._channel = channel
         self._timed = timed
 
-    def add(self, instance: str, status: int, category: str, text: str, time: float | None = None) -> None:
-        kept = len(self.messages)
-        super().add(instance, status, category, text, time)
-        if len(self.messages) > kept:
-            self._send(self.messages[-1])
-        elif status == OK and self._everything and not self._muted:
-            at = self.time.value if time is None else time
-            self._send(Message(instance, at, OK, category, text[:LONGEST].rstrip()))
-
-    def _send(self, message: Message) -> None:
+    def _relay(self, message: Message) -> None:
         at = message.time if self._timed else None
         self._channel.send("log", (message.instance, message.status, message.category, message.text, at))
 

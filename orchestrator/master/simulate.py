@@ -114,7 +114,7 @@ def simulate(
         ModelDescriptionError: an FMU has no library that this computer can load.
         SimulationError: an instance failed, a wire was not finite or writing the results failed.
         Interrupted: Ctrl-C or SIGTERM.
-        ResultsError: `out` is not writable, or the format needs a package that is missing.
+        ResultsError: `out` is not writable.
     """
     recorder = recorder_of(format)(Path(out), *_columns(plan))
     apart = apart and can_be_apart() and not keeps(plan) and not isinstance(opener, Isolation)

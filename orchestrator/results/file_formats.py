@@ -13,15 +13,13 @@ from __future__ import annotations
 import csv
 import ctypes
 import functools
-import importlib
 import pkgutil
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from types import ModuleType
 from typing import TYPE_CHECKING, Any, Protocol
 
-from yawbench.foundation.errors import ResultsError, ScenarioError
+from yawbench.foundation.errors import ScenarioError
 from yawbench.foundation.messages import hint, in_bytes
 from yawbench.foundation.safe_files import open_regular
 
@@ -44,22 +42,6 @@ class Format:
     recorder: str  # "module:class" in this package that writes it, see `recorder.recorder_of`
     source: str  # "module:class" that reads it, see `reader.source_of`
     bytes: int  # per value; measured on one run of each of the papers A to D, rounded
-    package: str = ""  # Python package that it needs besides those of yawbench
-    extra: str = ""  # of yawbench, with which that package is installed
-
-    def require(self) -> ModuleType | None:
-        """Import and return the package that it needs.
-
-        Raises:
-            ResultsError: it is not installed.
-        """
-        try:
-            return importlib.import_module(self.package) if self.package else None
-        except ImportError:
-            how = f"pip install 'yawbench[{self.extra}]'"
-            raise ResultsError(
-                f"results as {self.says} need the package {self.package}: {how}", code="package-missing"
-            ) from None
 
 
 FORMATS = {
@@ -68,12 +50,7 @@ FORMATS = {
         "recorder:Recorder", "file_formats:CsvFile", bytes=17,
     ),
     "parquet": Format(
-        "results.parquet", "Apache Parquet",
-        "parquet_and_mdf:ParquetRecorder", "parquet_and_mdf:ParquetFile", bytes=7,
-    ),
-    "mf4": Format(
-        "results.mf4", "ASAM MDF", "parquet_and_mdf:MdfRecorder", "parquet_and_mdf:MdfFile", bytes=8,
-        package="asammdf", extra="mdf",
+        "results.parquet", "Apache Parquet", "parquet:ParquetRecorder", "parquet:ParquetFile", bytes=7,
     ),
 }  # fmt: skip
 """Format name -> format. CSV is the default: every program reads it, and killed runs can be salvaged."""
@@ -82,17 +59,15 @@ FILES = {name: format.file for name, format in FORMATS.items()}
 
 
 def check_format(name: str) -> str:
-    """Return the name of a format if it can be used.
+    """Return the name of a format.
 
     Raises:
         ScenarioError: the format does not exist.
-        ResultsError: a package that it needs is missing.
     """
     if name not in FORMATS:
         raise ScenarioError(
             f"--format {name}: no such format{hint(name, FORMATS, lead='there are')}", code="format-unknown"
         )
-    FORMATS[name].require()
     return name
 
 

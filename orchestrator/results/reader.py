@@ -311,7 +311,6 @@ def source_of(path: Path, texts: Sequence[str]) -> ResultsSource:
 
     Raises:
         OSError, ValueError: it is not a file that a run writes.
-        ResultsError: a package that the format needs is missing.
     """
     (format,) = (format for format in FORMATS.values() if format.file == path.name)
     source: ResultsSource = load_class(format.source)(path, texts)

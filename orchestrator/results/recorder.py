@@ -385,7 +385,6 @@ def recorder_of(format: str) -> type[Recorder]:
 
     Raises:
         ScenarioError: the format does not exist.
-        ResultsError: a package that it needs is missing.
     """
     recorder: type[Recorder] = load_class(FORMATS[check_format(format)].recorder)
     return recorder

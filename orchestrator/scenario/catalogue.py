@@ -164,12 +164,12 @@ def find(source: str | Path, kind: str) -> Path:
         raise ScenarioError(f"{source}: {_what_is_in(path, kind)}", code="scenario-unknown")
     if os.path.exists(path):
         return path
+    if file := named(source, kind):
+        return file
     known = [name.removeprefix(f"{HOMES.get(kind)}/") for name in names(kind)]
     elsewhere = [name for name in known if path.stem == name.rpartition("/")[2]]
     if (path.suffix in ENDINGS and not elsewhere) or path.suffix.lower() in (*ARCHIVES, FMU):
         return path
-    if file := named(source, kind):
-        return file
     for folder in (base / path for base in folders()):
         if os.path.isdir(folder):
             raise ScenarioError(f"{source}: {_what_is_in(folder, kind)}", code="scenario-unknown")

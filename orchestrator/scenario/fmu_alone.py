@@ -10,12 +10,13 @@ from typing import Any
 from xml.etree import ElementTree
 
 from yawbench.fmus.fmu import Fmu
-from yawbench.foundation.errors import Diagnostic, Location
 
 from ..signal_names import RESERVED
 from .quantities import exact_text, instant, seconds
 from .yaml_lines import Document
 
+LACKS = "its default experiment has"
+"""What messages say of a time that is not there."""
 INTERVALS = 500
 """Communication steps of a run whose FMU names none. Chosen: what OpenModelica and FMPy take."""
 
@@ -59,16 +60,3 @@ def experiment_of(fmu: Fmu) -> dict[str, Fraction]:
             number = float(stated.get(attribute, "nan"))
             times[key] = (instant if key == "start_time" else seconds)(number)
     return times
-
-
-def missing_times(document: Document) -> list[Diagnostic]:
-    """Return an error for each time that neither the FMU nor an option gives."""
-    return [
-        Diagnostic(
-            "key-missing",
-            f"its default experiment has no {words}: give one in s, such as --set {name}={such_as}",
-            location=Location(document.path),
-        )
-        for name, words, such_as in (("stop_time", "stop time", "10"), ("step_size", "step size", "0.01"))
-        if name not in document.data
-    ]

@@ -8,7 +8,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from yawbench.foundation.errors import ScenarioError
+from yawbench.foundation.errors import Diagnostic, Location, ScenarioError
 from yawbench.foundation.messages import hint, listed
 from yawbench.foundation.safe_files import reads
 
@@ -57,7 +57,7 @@ def load_scenario(
     vehicle_document = _read_vehicle(document, read)
     replaced, effective = overrides.apply_changes(document, vehicle_document, wanted)
     replaced = _swapped_by_likeness(document) | replaced
-    if other and isinstance(document.data, dict) and (missing := other.missing_times(document)):
+    if other and isinstance(document.data, dict) and (missing := _missing_times(document, other.LACKS)):
         raise ScenarioError(document.sorted_errors() + missing)
     if not validate:
         overrides.leave_unvalidated(document)
@@ -97,7 +97,7 @@ def _swapped_by_likeness(document: Document) -> dict[str, str]:
 
 
 def _other_reader(path: Path) -> Any:
-    """Return the module that reads and asks about what is not a scenario file, None if it is one."""
+    """Return the module that reads what is not a scenario file, None if it is one."""
     if path.suffix.lower() in ARCHIVES:
         from . import ssp_read  # lxml takes long to import, and scenario files do not need it
 
@@ -107,6 +107,22 @@ def _other_reader(path: Path) -> Any:
 
         return fmu_alone
     return None
+
+
+def _missing_times(document: Document, lacks: str) -> list[Diagnostic]:
+    """Return an error for each time that neither what is not a scenario file nor an option gives."""
+    return [
+        Diagnostic(
+            "key-missing",
+            f"{lacks} no {words}: give one in s, such as --set {name}={such_as}",
+            location=Location(document.path),
+        )
+        for name, words, such_as in (
+            ("stop_time", "stop time", 10),
+            ("step_size", "communication step", 0.001),
+        )
+        if name not in document.data
+    ]
 
 
 def _read_vehicle(document: Document, read: Callable[..., Document]) -> Document:

@@ -32,7 +32,7 @@ from lxml import etree
 from lxml.etree import _Element
 
 from yawbench.fmus.fmu import UnitDefinition, Value, integer_limits
-from yawbench.foundation.errors import Diagnostic, Location
+from yawbench.foundation.errors import Diagnostic
 from yawbench.foundation.messages import fold, listed
 
 from ..signal_names import RESERVED
@@ -61,6 +61,8 @@ from .ssp_archive import (
 )
 from .yaml_lines import Document
 
+LACKS = "the archive says"
+"""What messages say of a time that is not there."""
 Scale = tuple[float, float]
 """Gain and offset."""
 
@@ -148,20 +150,6 @@ def read(path: Path, *, what: str = "SSP archive") -> Document:
     except SspError as refused:
         document.add(refused.diagnostic(path if path.parent.is_dir() else path.parent))
     return document
-
-
-def missing_times(document: Document) -> list[Diagnostic]:
-    """Return an error for each time that neither the archive nor an option gives."""
-    wanted = {"stop_time": ("stop time", "10"), "step_size": ("communication step", "0.001")}
-    return [
-        Diagnostic(
-            "key-missing",
-            f"the archive says no {words}: give one in s, such as --set {name}={such_as}",
-            location=Location(document.path),
-        )
-        for name, (words, such_as) in wanted.items()
-        if name not in document.data
-    ]
 
 
 def _scenario(archive: SspArchive, document: Document) -> dict[str, Any]:

@@ -126,6 +126,11 @@ class Connector:
             self._prefer(ends[0], ends[1], key)
             return []
         (target, to_pattern) = ends[1]
+        single = ends[0] if isinstance(ends[0], SignalName) else None
+        sources = [single.instance] if single else list(ends[0] or ())
+        if target in sources:
+            self._report(key, f"connects {target} to itself", "connection-invalid")
+            return []
         inputs = self._system.matching_inputs(target, to_pattern)
         arrays = self._arrays(ends[0], ends[1])
         if arrays is not None:
@@ -135,12 +140,7 @@ class Connector:
         if ends[0] is None:
             self._refused.update((target, name) for name in inputs.values())
             return []
-        single = ends[0] if isinstance(ends[0], SignalName) else None
-        sources = [single.instance] if single else list(ends[0])
         from_pattern = single.variable if single else "*"
-        if target in sources:
-            self._report(key, f"connects {target} to itself", "connection-invalid")
-            return []
         self._refuse_twice(sources, (*key, "from"))
         matches = [(source, matching(from_pattern, self._outputs[source])) for source in sources]
         if single and not matches[0][1]:
@@ -189,9 +189,6 @@ class Connector:
         source, target = connection.source, connection.target
         assert isinstance(source, SignalName)
         assert isinstance(target, SignalName)
-        if source.instance == target.instance:
-            self._report(key, f"connects {target.instance} to itself", "connection-invalid")
-            return []
         of, to = ([v.name[len(v.array) :] for v in end] for end in (outputs, inputs))
         if of != to:
             has, takes = (end[-1].strip("[]").replace(",", "x") or "one" for end in (of, to))
@@ -219,9 +216,7 @@ class Connector:
         if any(self._outputs[s].keys() & self._inputs[t].keys() for s, t in ends):
             return
         if self._scenario.replaced.keys() & {*sources, *targets}:
-            self._system.note(
-                "left-out-after-swap", f"{dotted(key)} is left out: no names are equal any more"
-            )
+            self._system.left_out(dotted(key), "no names are equal any more")
             return
         from_names, to_names = listed(sources, last="or"), listed(targets, last="or")
         self._report(
@@ -253,10 +248,7 @@ class Connector:
     def _no_such(self, key: KeyPath, instance: str, pattern: str, kind: str) -> None:
         """Report a pattern without a match; only note it if the replaced FMU has a match."""
         if self._system.had([instance], pattern, kind):
-            self._system.note(
-                "left-out-after-swap",
-                f"{dotted(key[:2])} is left out: {instance} has no {kind} {pattern!r} any more",
-            )
+            self._system.left_out(dotted(key[:2]), f"{instance} has no {kind} {pattern!r} any more")
             return
         variable = self._fmus[instance].variables.get(pattern)
         if variable is not None:

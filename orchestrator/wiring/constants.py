@@ -85,10 +85,7 @@ def constants(system: WiringContext, domain: Domain) -> dict[Input, Constant]:
                 continue
             parts = dict.fromkeys(each, "")
         if not parts and system.had(instances, name_pattern, "input"):
-            system.note(
-                "left-out-after-swap",
-                f"inputs.{pattern} is left out: no instance has such an input after the swap",
-            )
+            system.left_out(f"inputs.{pattern}", "no instance has such an input after the swap")
         elif not parts:
             names = fold(list(dict.fromkeys(name for instance in instances for name in inputs[instance])))
             system.report(
@@ -136,9 +133,7 @@ def _of_facts(system: WiringContext) -> Iterator[tuple[Input, Constant]]:
         ]
         if fact.inputs and not takers:
             if not given.changed and any(system.had(known, variable, "input") for variable in fact.inputs):
-                system.note(
-                    "left-out-after-swap", f"{name} is left out: no instance has such an input after the swap"
-                )
+                system.left_out(name, "no instance has such an input after the swap")
             else:
                 system.report(given.where, f"no instance has an input {name}", "variable-unknown")
         refused: dict[str, list[str]] = {}

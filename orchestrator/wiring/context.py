@@ -108,6 +108,10 @@ class WiringContext:
         """Add a diagnostic that is not an error."""
         self.notes.append(Diagnostic(code, sentence, severity))
 
+    def left_out(self, what: str, why: str) -> None:
+        """Note what was meant for a replaced FMU, and is ignored."""
+        self.note("left-out-after-swap", f"{what} is left out: {why}")
+
     def report(self, where: KeyPath | Location, sentence: str, code: str = "value-invalid") -> None:
         """Report an error about a value: at a key of the scenario, or at a place.
 

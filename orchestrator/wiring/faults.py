@@ -144,7 +144,7 @@ class _Finder:
         ]  # fmt: skip
         if not matching_wires:
             if {location.instance, location.target} & self.system.scenario.replaced.keys():
-                self._left_out()
+                self.system.left_out(_said(self.given), "there is no such signal any more")
                 return []
             self._report(
                 f"no wire leads from {location.instance}.{location.variable} to {location.target}"
@@ -163,15 +163,11 @@ class _Finder:
 
     def _no_such(self, instance: str, pattern: str) -> None:
         if self.system.had([instance], pattern):
-            self._left_out()
+            self.system.left_out(_said(self.given), "there is no such signal any more")
             return
         names = fold([*self.system.outputs[instance], *self.system.inputs[instance]])
         guess = hint(pattern, names, lead="it has")
         self._report(f"{instance} has neither an output nor an input {pattern!r}{guess}", "variable-unknown")
-
-    def _left_out(self) -> None:
-        fault = _said(self.given)
-        self.system.note("left-out-after-swap", f"{fault} is left out: there is no such signal any more")
 
     def _report(self, sentence: str, code: str) -> None:
         self.system.report(_part(self.given, "on"), sentence, code)

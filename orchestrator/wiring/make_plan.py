@@ -102,8 +102,7 @@ def recorded(system: WiringContext) -> tuple[SignalName, ...]:
         if columns:
             continue
         if system.had(instances, pattern):
-            sentence = f"record[{i}] is left out: {instance} has no variable {pattern!r} any more"
-            system.note("left-out-after-swap", sentence)
+            system.left_out(f"record[{i}]", f"{instance} has no variable {pattern!r} any more")
             continue
         usual, every = ([v.name for u in instances for v in of(fmus[u])] for of in (_usual, _all))
         names = every if closest(pattern, usual) is None and closest(pattern, every) else usual

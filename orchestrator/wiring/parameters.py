@@ -167,10 +167,7 @@ class Parameters:
             if takers or name in self.known:
                 continue
             if any(is_parameter(fmu, name) for fmu in self.system.before()):
-                self.system.note(
-                    "left-out-after-swap",
-                    f"vehicle.{name} is left out: no instance has such a parameter after the swap",
-                )
+                self.system.left_out(f"vehicle.{name}", "no instance has such a parameter after the swap")
             else:
                 declared = {v.name for fmu in self.fmus.values() for v in fmu.of("parameter")}
                 likely = closest(name, sorted(declared | {*self.known}))
@@ -233,8 +230,7 @@ class Parameters:
                 self.give(instance, element, one)
         elif not is_parameter(fmu, name):
             if self._is_left_out(instance, name, given):
-                sentence = f"{instance}.{name} is left out: {fmu.name} has no such parameter"
-                self.system.note("left-out-after-swap", sentence)
+                self.system.left_out(f"{instance}.{name}", f"{fmu.name} has no such parameter")
             else:
                 self.system.report(given.where, unknown_parameter(instance, fmu, name), "parameter-unknown")
         elif not isinstance(value, TextSpec):
@@ -264,10 +260,7 @@ class Parameters:
                 continue  # for a fact with inputs, `constants` reports whether it has an effect
             before = any(self.system.had(self.fmus, name, "parameter") for name in fact.parameters)
             if before and not given.changed:
-                self.system.note(
-                    "left-out-after-swap",
-                    f"{fact_name} is left out: no instance has such a parameter after the swap",
-                )
+                self.system.left_out(fact_name, "no instance has such a parameter after the swap")
             else:
                 sentence = f"no instance has a parameter {listed(fact.parameters, last='or')}"
                 self.system.report(given.where, sentence, "parameter-unknown")

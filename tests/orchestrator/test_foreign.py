@@ -217,8 +217,7 @@ def test_gain_and_offset_reach_units_that_declare_no_units_of_measurement(run, i
 
 
 @mostly_together
-@pytest.mark.parametrize("form", ["csv", "parquet", "mf4"])
-@pytest.mark.sampled(2)
+@pytest.mark.parametrize("form", ["csv", "parquet"])
 def test_text_parameters_and_inputs_are_recorded_by_name(run, isolate, form):
     status, said, results = run(
         *isolate,

@@ -1,4 +1,4 @@
-"""Results as Parquet and as MDF: the same numbers, to the bit, as from CSV; with units."""
+"""Results as Parquet: the same numbers, to the bit, as from CSV; with units."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from tests.refusals import mentions, refused
 from yawbench.foundation.errors import ResultsError, ScenarioError, SimulationError, YawbenchError
 from yawbench.foundation.messages import listed
 from yawbench.orchestrator.master.simulate import simulate, simulate_in_memory
-from yawbench.orchestrator.results import parquet_and_mdf
+from yawbench.orchestrator.results import parquet
 from yawbench.orchestrator.results.file_formats import FILES
 from yawbench.orchestrator.results.reader import load_results
 from yawbench.orchestrator.results.recorder import BLOCK, MemoryRecorder, recorder_of
@@ -89,7 +89,7 @@ def test_results_in_memory_are_those_on_disk(tmp_path):
 
 
 def test_parquet_files_carry_units_and_row_groups(tmp_path, monkeypatch):
-    monkeypatch.setattr(parquet_and_mdf.ParquetRecorder, "CHUNK", BLOCK)
+    monkeypatch.setattr(parquet.ParquetRecorder, "CHUNK", BLOCK)
     record(tmp_path, 3 * BLOCK + 1, "parquet")
     file = pq.ParquetFile(tmp_path / "results.parquet")
     units = {field.name: field.metadata[b"unit"].decode() for field in file.schema_arrow}
@@ -98,35 +98,6 @@ def test_parquet_files_carry_units_and_row_groups(tmp_path, monkeypatch):
         "double", "int64", "double", "string", "double", "bool",
     ]  # fmt: skip
     assert file.metadata.num_row_groups == 4
-
-
-def test_the_group_of_an_mdf_file_is_decompressed_once_for_all_its_channels(tmp_path, monkeypatch):
-    asammdf = pytest.importorskip("asammdf")
-    from asammdf.blocks.mdf_v4 import MDF4
-
-    record(tmp_path, 200, "mf4")
-    alone = []
-    get = MDF4.get
-
-    def counted(mdf, *args, data=None, **options):
-        if data is None:  # asammdf decompresses the group for this channel
-            alone.append(options)
-        return get(mdf, *args, data=data, **options)
-
-    monkeypatch.setattr(MDF4, "get", counted)
-    assert asammdf and len(load_results(tmp_path).columns) == len(COLUMNS)
-    assert not alone
-
-
-def test_mdf_files_carry_units_the_title_and_the_start(tmp_path):
-    asammdf = pytest.importorskip("asammdf")
-    record(tmp_path, 20, "mf4")
-    with asammdf.MDF(tmp_path / "results.mf4") as mdf:
-        assert mdf.version == "4.10"
-        assert mdf.get("a.x").unit == "rad/s"
-        assert mdf.get("a.y").timestamps[1] == 0.001
-        assert mdf.header.start_time.isoformat() == "2024-01-02T03:04:05+00:00"
-        assert "Sine" in mdf.groups[0].channel_group.comment
 
 
 @pytest.mark.parametrize("name", OTHERS)
@@ -181,7 +152,7 @@ def test_a_run_in_memory_that_fails_says_nothing_of_files():
 def test_a_disk_without_room_is_one_sentence_and_keeps_the_earlier_results(name, tmp_path, monkeypatch):
     import resource
 
-    monkeypatch.setattr(parquet_and_mdf.ParquetRecorder, "CHUNK", BLOCK)
+    monkeypatch.setattr(parquet.ParquetRecorder, "CHUNK", BLOCK)
     simulate(plan(50), tmp_path, opener=Stage(units()), format=name)
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (9_000, limits[1]))
@@ -201,12 +172,6 @@ def test_a_disk_without_room_is_one_sentence_and_keeps_the_earlier_results(name,
 def test_an_unknown_format_names_those_there_are():
     with refused(ScenarioError, "format-unknown", names=("--format hdf5", *FILES)):
         recorder_of("hdf5")
-
-
-def test_mdf_without_its_package_says_how_to_get_it(tmp_path, monkeypatch):
-    monkeypatch.setitem(sys.modules, "asammdf", None)  # importing it is an ImportError
-    with refused(ResultsError, "package-missing", names=("ASAM", "MDF", "'yawbench[mdf]'", "asammdf")):
-        recorder_of("mf4")
 
 
 @pytest.mark.parametrize("name", OTHERS)

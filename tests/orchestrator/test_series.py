@@ -215,7 +215,7 @@ def test_a_series_for_a_units_input_goes_before_equal_names(folder: Path) -> Non
     assert each_mentions(texts_of(made), ("plant.steer_angle", "driver.steer_angle"))
 
 
-@pytest.mark.parametrize("form", ["parquet", "mf4", "csv"])
+@pytest.mark.parametrize("form", ["parquet", "csv"])
 def test_recorded_results_are_a_source_with_their_units(form, folder, monkeypatch) -> None:
     """Series of a run of any format; degrees that were recorded arrive as radians."""
 

@@ -14,7 +14,7 @@ from rich.console import Console
 
 import yawbench as yb
 from tests.checkout import ROOT
-from yawbench import _progress
+from yawbench.foundation import progress as _progress
 
 
 @pytest.fixture(scope="module")
@@ -83,7 +83,7 @@ def test_a_bar_can_be_refused(base, terminal):
 PROGRAM = """
 import os, sys
 import yawbench as yb
-from yawbench import _progress
+from yawbench.foundation import progress as _progress
 for delay, switch in ((60.0, ""), (0.0, "off"), (0.0, "")):
     _progress.DELAY, os.environ[_progress.SWITCH] = delay, switch
     yb.load("fnn_sideslip/25mps").set({"stop_time": 1}).run()

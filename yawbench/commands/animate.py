@@ -16,8 +16,8 @@ from yawbench.commands.recorded_runs import (
     MeasuredRuns,
     RunSources,
     folder_of_all,
+    labelled,
     labels_of,
-    read_runs,
     recorded,
     start_of,
     with_segments,
@@ -116,10 +116,8 @@ def write_view(
 
 def page_of(folders: Sequence[Path], labels: Sequence[str], panels: Sequence[str], start: float) -> str:
     """Return the page of a viewer; for arguments and errors see `write_view`."""
-    from yawbench.figures.display import LabelledRun
     from yawbench.reports.viewer import SETTINGS, Settings, page
     from yawbench.reports.viewer_views import View
 
-    read = read_runs(folders, start)
-    runs = [LabelledRun(name, results) for name, results in zip(labels, read, strict=True)]
+    runs = labelled(labels, folders, start)
     return page(runs, Settings((View(panels=panels),)) if panels else SETTINGS)

@@ -18,7 +18,14 @@ from yawbench.commands.options import (
     takes,
 )
 from yawbench.commands.output import hold, print_tables, tabular
-from yawbench.commands.recorded_runs import MeasuredFrom, MeasuredRuns, distinct, start_of, with_segments
+from yawbench.commands.recorded_runs import (
+    Labels,
+    MeasuredFrom,
+    MeasuredRuns,
+    distinct,
+    start_of,
+    with_segments,
+)
 from yawbench.commands.run import MetricsOption, metric_names
 
 if TYPE_CHECKING:
@@ -32,14 +39,6 @@ Swaps = Annotated[
         metavar="INSTANCE=FMU,FMU,...",
         help="FMUs to compare for an instance; a single FMU is compared with the scenario's. An FMU may "
         "bring parameters, FMU:PARAMETER=VALUE. Repeatable.",
-    ),
-]
-Labels = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--label",
-        metavar="TEXT",
-        help="Label of a run in tables and figures, in the order of the runs. Repeatable.",
     ),
 ]
 

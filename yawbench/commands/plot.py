@@ -18,8 +18,8 @@ from yawbench.commands.recorded_runs import (
     MeasuredRuns,
     RunSources,
     folder_of_all,
+    labelled,
     labels_of,
-    read_runs,
     recorded,
     start_of,
     with_segments,
@@ -176,7 +176,6 @@ def plot(
     """
     import matplotlib
 
-    from yawbench.figures.display import LabelledRun
     from yawbench.figures.panels import check_panels
     from yawbench.figures.plots import draw, overview_of, shown_by, size_of_style, within
     from yawbench.figures.plots import minus as differences
@@ -204,12 +203,7 @@ def plot(
         page_file = out if out is None or out.suffix == ".html" else out / "view.html"
         write_view(folders, labels, panel or (), page_file, start)
         return
-    runs = [
-        LabelledRun(name, results)
-        for name, results in zip(
-            labels, read_runs(folders, start, thin=minus is None and window is None), strict=True
-        )
-    ]
+    runs = labelled(labels, folders, start, thin=minus is None and window is None)
     if minus is not None:
         runs = differences(runs, runs[_place(minus, labels, folders)])
         if "path" in (panel or ()):

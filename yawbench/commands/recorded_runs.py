@@ -16,6 +16,7 @@ from yawbench.foundation.errors import ScenarioError
 from yawbench.foundation.messages import counted
 
 if TYPE_CHECKING:
+    from yawbench.figures.display import LabelledRun
     from yawbench.orchestrator.results.reader import Results
 
 
@@ -28,7 +29,9 @@ RunSources = Annotated[
 Labels = Annotated[
     list[str] | None,
     typer.Option(
-        "--label", metavar="TEXT", help="Label of a run in the legend, in the order of RESULTS. Repeatable."
+        "--label",
+        metavar="TEXT",
+        help="Label of a run in tables and figures, in the order of runs. Repeatable.",
     ),
 ]
 
@@ -170,3 +173,12 @@ def read_runs(places: Sequence[Path], start: float, *, thin: bool = False) -> li
 
     thin = thin and not any(map(is_measurement, places))
     return filtered_alike([load_run(place, thin=thin, start=start) for place in places])
+
+
+def labelled(
+    labels: Sequence[str], places: Sequence[Path], start: float, *, thin: bool = False
+) -> list[LabelledRun]:
+    """Return runs and measurements with their labels; see `read_runs`."""
+    from yawbench.figures.display import LabelledRun
+
+    return [*map(LabelledRun, labels, read_runs(places, start, thin=thin))]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import textwrap
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, Annotated
 
@@ -12,7 +11,7 @@ import typer
 
 from yawbench.commands import output
 from yawbench.foundation.errors import Diagnostic, ScenarioError, SimulationError, warnings_in
-from yawbench.foundation.messages import printable
+from yawbench.foundation.progress import bar
 
 from .options import CHANGES, MAKING, RunOptions, ScenarioFile, completing_names, plan_of_scenario, takes
 from .output import print_tables, say, shows_bars, tabular
@@ -71,10 +70,10 @@ LogOption = Annotated[
 
 SHOWN = 5
 """Number of warnings shown; all are in run.json."""
+THREADS = "OPENBLAS_NUM_THREADS"
+"""Environment variable that the library of NumPy reads when it is loaded: its threads."""
 FASTEST = 1e6
 """Largest pace [1]; chosen: no run is as fast."""
-BESIDE = 36
-"""Columns of the terminal reserved for the bar and its numbers."""
 
 
 @tabular
@@ -95,7 +94,8 @@ def run(
     appended to the name. They replace those of an earlier run, but a failed run never replaces a
     completed one: its results go to failed/ in that folder.
     """
-    from yawbench.orchestrator.master.compiled_loop import slower_because
+    with _without_threads():
+        from yawbench.orchestrator.master.compiled_loop import slower_because
     from yawbench.orchestrator.master.isolation import opener_of
     from yawbench.orchestrator.master.log import STATUS, WARNING
     from yawbench.orchestrator.master.simulate import simulate
@@ -131,13 +131,13 @@ def run(
         with (
             _seen(plan, live) as watch,
             _listening(log) as hear,
-            _bar(title, wanted=not live) as progress,
+            bar(title, wanted=shows_bars() and not live, ticking=False) as shown,
             opener_of(plan, options.limit) as opener,
         ):
             info = simulate(
                 plan,
                 folder,
-                progress=progress,
+                progress=shown.update,
                 opener=opener,
                 watch=watch,
                 format=options.format_,
@@ -173,6 +173,23 @@ def run(
         output.answer(
             metrics={name: {"value": value.number, "unit": value.unit} for name, value in numbers.items()}
         )
+
+
+@contextlib.contextmanager
+def _without_threads() -> Iterator[None]:
+    """Have NumPy, if the block imports it, start no threads for products of large matrices.
+
+    A run has none, and starting them takes a twentieth of the time of a short one. What FMUs load later
+    starts its own, and whoever sets the variable has what it says.
+    """
+    if THREADS in os.environ:
+        yield
+        return
+    os.environ[THREADS] = "1"
+    try:
+        yield
+    finally:
+        del os.environ[THREADS]
 
 
 @contextlib.contextmanager
@@ -251,28 +268,3 @@ def _seen(plan: Plan, live: bool) -> Iterator[Watch]:
 
     with Live(plan, watch, terminal=shows_bars()) as shown:
         yield shown
-
-
-@contextlib.contextmanager
-def _bar(title: str, *, wanted: bool = True) -> Iterator[Callable[[int, int], None] | None]:
-    """Show a progress bar on a terminal while the block runs, and nothing elsewhere.
-
-    It redraws only when the run reports progress: a bar with a thread of its own would take the interpreter
-    lock away from the FMUs.
-    """
-    if not (wanted and shows_bars()):
-        yield None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
-
-    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
-    console = Console(stderr=True)
-    with Progress(*columns, console=console, auto_refresh=False, transient=True) as bar:
-        shown = textwrap.shorten(title, max(10, console.width - BESIDE), placeholder="…")
-        task = bar.add_task(printable(shown).replace("[", r"\["), total=None)
-
-        def report(done: int, total: int) -> None:
-            bar.update(task, completed=done, total=total, refresh=True)
-
-        yield report

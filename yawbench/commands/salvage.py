@@ -20,7 +20,7 @@ def salvage(folders: Folders) -> None:
 
     Killed processes leave files that end in .part. Their complete rows become results with the status
     "died"; if the folder has results of an earlier run, which become readable again, they go to failed/
-    instead. Incomplete Parquet and MDF files cannot be recovered.
+    instead. Incomplete Parquet files cannot be recovered.
     """
     from yawbench.orchestrator.results.salvage import lost_format, salvage
 

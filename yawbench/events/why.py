@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import NamedTuple
 
 from yawbench.orchestrator.results.run_record import EventRecord
@@ -53,15 +52,10 @@ class Course:
     def first(self, *kinds: str) -> EventRecord | None:
         return next(iter(self.of(*kinds)), None)
 
-    @cached_property
-    def grip(self) -> EventRecord | None:
-        """The first axle that was at its grip in what led to the loss."""
-        return self.first("axle-at-grip")
-
     @property
     def begin(self) -> float:
         """When the loss began to build up [s]: with an axle at its grip, or the steering."""
-        first = self.grip or self.first("yaw-rate-past", "steering")
+        first = self.first("axle-at-grip") or self.first("yaw-rate-past", "steering")
         return first.time if first else self.loss.time
 
     def share(self, kind: str, begin: float, end: float) -> float:
@@ -79,17 +73,14 @@ class Course:
 Cause = Callable[[Course], Reason | None]
 
 
-def _fault(course: Course) -> Reason | None:
-    fault = course.first("fault")
-    return Reason(f"the fault in {fault.where} acts from {_at(fault)}", fault) if fault else None
+def _first(kind: str, words: Callable[[EventRecord], str]) -> Cause:
+    """Return the cause that is the first event of a kind, in words."""
 
+    def cause(course: Course) -> Reason | None:
+        event = course.first(kind)
+        return Reason(words(event), event) if event else None
 
-def _sensor(course: Course) -> Reason | None:
-    off = course.first("sensor-off")
-    if off is None:
-        return None
-    says = f"the measured {off.where} is wrong from {_at(off)}, by up to {_number(off.value)}"
-    return Reason(says, off)
+    return cause
 
 
 def _against(course: Course) -> Reason | None:
@@ -105,14 +96,6 @@ def _against(course: Course) -> Reason | None:
     worst = max(against, key=lambda event: event.value or 0.0)
     says = f"the yaw moment has the wrong sign: it turns the car further away from {_at(against[0])}"
     return Reason(f"{says}, with up to {_quantity(worst)}", against[0])
-
-
-def _friction(course: Course) -> Reason | None:
-    falls = course.first("friction-falls")
-    if falls is None:
-        return None
-    says = f"the friction under a wheel falls at {_at(falls)}, to {_number(falls.value)} % of what it was"
-    return Reason(says, falls)
 
 
 def _misjudged(course: Course) -> Reason | None:
@@ -190,29 +173,34 @@ LOCKED = 50.0
 """Slip from which a wheel has lost its side force [%]; chosen: well past the largest force of any tyre."""
 
 
-def _wind(course: Course) -> Reason | None:
-    wind = course.first("wind")
-    says = f"side wind of up to {_quantity(wind)} from {_at(wind)}" if wind else ""
-    return Reason(says, wind) if wind else None
-
-
-def _asked(course: Course) -> Reason | None:
-    asked = course.first("reference-past")
-    if asked is None:
-        return None
-    says = f"more yaw rate is asked for than grip can hold, {_number(asked.value)} % of it from {_at(asked)}"
-    return Reason(says, asked)
-
-
-def _grip(course: Course) -> Reason | None:
-    grip = course.grip
-    return Reason(f"the {grip.where} is at its grip from {_at(grip)}", grip) if grip else None
-
-
 CAUSES: tuple[Cause, ...] = (
-    _fault, _sensor, _against, _friction, _misjudged, _nothing, _late, _slips, _unmet, _saturated, _wind,
-    _grip, _asked,
-)  # fmt: skip
+    _first("fault", lambda fault: f"the fault in {fault.where} acts from {_at(fault)}"),
+    _first(
+        "sensor-off",
+        lambda off: f"the measured {off.where} is wrong from {_at(off)}, by up to {_number(off.value)}",
+    ),
+    _against,
+    _first(
+        "friction-falls",
+        lambda falls: (
+            f"the friction under a wheel falls at {_at(falls)}, to {_number(falls.value)} % of what it was"
+        ),
+    ),
+    _misjudged,
+    _nothing,
+    _late,
+    _slips,
+    _unmet,
+    _saturated,
+    _first("wind", lambda wind: f"side wind of up to {_quantity(wind)} from {_at(wind)}"),
+    _first("axle-at-grip", lambda grip: f"the {grip.where} is at its grip from {_at(grip)}"),
+    _first(
+        "reference-past",
+        lambda asked: (
+            f"more yaw rate is asked for than grip can hold, {_number(asked.value)} % of it from {_at(asked)}"
+        ),
+    ),
+)
 """Causes in the order in which one explains the next."""
 
 

@@ -10,13 +10,17 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from datetime import datetime
+from io import BytesIO
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from yawbench.foundation.errors import ResultsError
 from yawbench.foundation.safe_files import write_whole
 from yawbench.orchestrator.results.file_formats import column_of
-from yawbench.orchestrator.results.parquet_and_mdf import UNIT, MdfGroup, mdf_of
+from yawbench.orchestrator.results.parquet import UNIT
 
 from .formats import ExportedRun
 
@@ -70,13 +74,32 @@ def _table(runs: Sequence[ExportedRun]) -> tuple[Any, dict[str, str]]:
 
 
 def write_mdf(runs: Sequence[ExportedRun], file: Path) -> list[Path]:
-    """Write a group of channels per run, named by its label."""
-    groups = [
-        MdfGroup(run.label, run.title, run.results.time, run.results.columns, run.results.units)
-        for run in runs
-    ]
-    write_whole(file, mdf_of(groups, runs[0].results.record.started), named=True)
+    """Write a group of channels per run, named by its label.
+
+    Data are not compressed: programs that read one channel after the other, as most do, would decompress the
+    whole group for each, 3.4 s for the 95 channels of a run of 6.5 s where it takes 0.2 s now.
+    """
+    from asammdf import MDF, Signal
+
+    with MDF(version="4.10") as mdf:
+        if started := runs[0].results.record.started:
+            mdf.header.start_time = datetime.fromisoformat(started)
+        for run in runs:
+            signals = [
+                Signal(_samples(array), run.results.time, name=name, unit=run.unit_of(name), encoding="utf-8")
+                for name, array in run.results.columns.items()
+            ]
+            mdf.append(signals, acq_name=run.label, comment=run.title, common_timebase=True)
+        data = BytesIO()
+        mdf.save(data, compression=0)
+    write_whole(file, data.getvalue(), named=True)
     return []
+
+
+def _samples(array: np.ndarray) -> np.ndarray:
+    if array.dtype.kind in "OU":
+        return np.array([str(value).encode() for value in array])
+    return array
 
 
 def write_mat(runs: Sequence[ExportedRun], file: Path) -> list[Path]:
@@ -85,8 +108,6 @@ def write_mat(runs: Sequence[ExportedRun], file: Path) -> list[Path]:
     Raises:
         ResultsError: the file would be too large for MATLAB 5.
     """
-    import io
-
     from scipy.io import savemat
     from scipy.io.matlab import MatWriteError
 
@@ -100,7 +121,7 @@ def write_mat(runs: Sequence[ExportedRun], file: Path) -> list[Path]:
             one.setdefault(_identifier(instance), {})[inner] = values[:, None]
             units.setdefault(_identifier(instance), {})[inner] = run.unit_of(column) or "1"
         content[_identifier(run.label, content)] = {**one, "units": units}
-    data = io.BytesIO()
+    data = BytesIO()
     try:
         savemat(data, content, long_field_names=True, do_compression=True)
     except (MatWriteError, OverflowError):

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from yawbench import arguments
-from yawbench._progress import bar
 from yawbench._scenario import Scenario
 from yawbench.foundation.errors import ScenarioError
 from yawbench.foundation.messages import listed, short
+from yawbench.foundation.progress import bar
 from yawbench.orchestrator.scenario.overrides import with_changes
 
 from .operating_point import LARGE, SMALL, OperatingPoint

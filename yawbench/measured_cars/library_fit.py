@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from yawbench import arguments
-from yawbench._progress import bar
+from yawbench.foundation.progress import bar
 from yawbench.planner import Planner
 
 from .fit_file import load_fit

@@ -13,8 +13,9 @@ from yawbench.foundation.errors import ResultsError
 from yawbench.orchestrator.recordings.gaps import notes_on
 from yawbench.orchestrator.results.reader import Results, load_results
 from yawbench.orchestrator.results.run_record import FmuRecord, RunRecord, RunStatus
+from yawbench.orchestrator.scenario.catalogue import YAML
 
-from .measurement import ENDINGS, MEASURABLE, load_measurement
+from .measurement import MEASURABLE, load_measurement
 from .segment import LowPass, even_grid
 
 STEERING = ("steering_wheel_angle", "steer_angle", "drive_force")
@@ -47,7 +48,7 @@ def load_run(path: Path | str, *, thin: bool = False, start: float = 0.0) -> Res
 
 def is_measurement(path: Path) -> bool:
     """Return whether a path is that of a measurement file, or of a segment of it, not of a folder."""
-    return path.suffix.partition("#")[0] in ENDINGS and not path.is_dir()
+    return path.suffix.partition("#")[0] in YAML and not path.is_dir()
 
 
 def segments_of(path: Path) -> list[Path]:

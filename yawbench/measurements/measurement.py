@@ -83,8 +83,6 @@ from .segment import (
 
 MEASURABLE: dict[str, SignalEntry] = {name: entry for key, entry in SIGNALS.items() for name in wheels(key)}
 """Signals that a measurement may have, those of wheels one by one."""
-ENDINGS = (".yaml", ".yml")
-"""Endings of measurement files."""
 BY_TIME = "time"
 BY_GAPS = "gaps"
 OF_CAR = {name: entry.unit for name, entry in CAR.items()} | {"friction": "1"}

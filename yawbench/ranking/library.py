@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from yawbench import arguments
 from yawbench._controller import Controller, ControllerLike, PythonComponent
-from yawbench._progress import bar
 from yawbench._run import shown_in_notebooks
 from yawbench._run_many import make_all, planner_of
 from yawbench._scenario import fmu_of
 from yawbench.components.fmi.component import Component
 from yawbench.foundation.errors import ScenarioError
 from yawbench.foundation.messages import hint
+from yawbench.foundation.progress import bar
 from yawbench.orchestrator.results.folder_lock import writing
 from yawbench.orchestrator.scenario import catalogue
 from yawbench.studies.executor import Executor

@@ -9,12 +9,13 @@ from __future__ import annotations
 import contextlib
 import os
 import sys
+import textwrap
 import threading
 from collections.abc import Iterator
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
-from yawbench.foundation.messages import printable
+from .messages import printable
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -24,6 +25,8 @@ DELAY = 2.0
 """Time [s] before a bar appears. Chosen: shorter calls need none."""
 SWITCH = "YAWBENCH_PROGRESS"
 """Environment variable; "off" disables bars."""
+BESIDE = 36
+"""Columns of the terminal reserved for the bar and its numbers."""
 _shown = threading.Lock()
 """Lock of the call whose bar is shown; calls within it show none."""
 
@@ -31,8 +34,8 @@ _shown = threading.Lock()
 class Bar:
     """Progress of a call; safe to use from other threads."""
 
-    def __init__(self, title: str, total: int | None) -> None:
-        self._title, self._total, self._done = title, total, 0
+    def __init__(self, title: str, total: int | None, ticking: bool) -> None:
+        self._title, self._total, self._done, self._ticking = title, total, 0, ticking
         self._display: Progress | None = None
         self._task: Any = None
 
@@ -40,7 +43,7 @@ class Bar:
         """Set the number of completed items, and the total if known."""
         self._done, self._total = done, total
         if self._display is not None:
-            self._display.update(self._task, completed=done, total=total)
+            self._display.update(self._task, completed=done, total=total, refresh=not self._ticking)
 
     def advance(self) -> None:
         """Count a completed item."""
@@ -54,8 +57,9 @@ class Bar:
         """Show the bar."""
         from rich.progress import Progress
 
-        display = Progress(console=on, transient=True)
-        title = printable(self._title).replace("[", r"\[")
+        display = Progress(console=on, transient=True, auto_refresh=self._ticking)
+        shown = textwrap.shorten(self._title, max(10, on.width - BESIDE), placeholder="…")
+        title = printable(shown).replace("[", r"\[")
         self._task = display.add_task(title, total=self._total, completed=self._done)
         display.start()
         self._display = display
@@ -67,15 +71,18 @@ class Bar:
 
 
 @contextlib.contextmanager
-def bar(title: str, total: int | None = None, *, wanted: bool | None = None) -> Iterator[Bar]:
+def bar(
+    title: str, total: int | None = None, *, wanted: bool | None = None, ticking: bool = True
+) -> Iterator[Bar]:
     """Show a bar while the block runs, if it runs long and output goes to a terminal or notebook.
 
     Args:
         title: label of the bar.
         total: number of items, if known.
         wanted: True: show it immediately and anywhere; False: never.
+        ticking: whether a thread redraws it between reports, too: not where this process is copied meanwhile.
     """
-    made, on = Bar(title, total), None if wanted is False else _console(always=bool(wanted))
+    made, on = Bar(title, total, ticking), None if wanted is False else _console(always=bool(wanted))
     if on is None or not _shown.acquire(blocking=False):
         yield made
         return
