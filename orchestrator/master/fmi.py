@@ -5,27 +5,33 @@ FMI 3.0 is used without event mode and early return.
 
 from __future__ import annotations
 
-import contextlib
 import ctypes
 import functools
 import math
 import os
 from collections.abc import Callable
-from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+
+from fmpy import calloc, free
+from fmpy.fmi2 import (
+    fmi2CallbackAllocateMemoryTYPE,
+    fmi2CallbackFreeMemoryTYPE,
+    fmi2CallbackFunctions,
+    fmi2CallbackLoggerTYPE,
+    fmi2CoSimulation,
+    fmi2LastSuccessfulTime,
+    fmi2Terminated,
+)
+from fmpy.fmi3 import fmi3IntermediateUpdateCallback, fmi3LogMessageCallback
 
 from yawbench.fmus.archive import is_native
-from yawbench.fmus.description import INTEGERS, platform
+from yawbench.fmus.description import INTEGERS
 
 from ..plan import Instance, Plan
 from .arithmetic import Arithmetic
 from .compiled_loop import Kind, OperationData
-from .instance import BoundCall, C, CtypesInstance, ExperimentSetup, PlainCall, Status
+from .instance import BoundCall, CtypesInstance, ExperimentSetup, PlainCall, Status
 from .log import DISCARD, OK, WARNING, Log, listen, receive
-
-_CO_SIMULATION, _LAST_SUCCESSFUL_TIME, _TERMINATED = 1, 2, 3
-"""`fmi2CoSimulation` of `fmi2Type`; `fmi2LastSuccessfulTime` and `fmi2Terminated` of `fmi2StatusKind`."""
 
 
 class Fmi2Instance(CtypesInstance):
@@ -45,12 +51,12 @@ class Fmi2Instance(CtypesInstance):
 
     def _instantiate(self, instance: Instance) -> int | None:
         callbacks = _callbacks()
-        callbacks.environment = self._listener = listen(self._log, instance.name, callbacks)
+        callbacks.componentEnvironment = self._listener = listen(self._log, instance.name, callbacks)
         instantiate = self._function("Instantiate")
         instantiate.restype = ctypes.c_void_p
         component: int | None = instantiate(
             instance.name.encode(),
-            _CO_SIMULATION,
+            fmi2CoSimulation,
             instance.fmu.guid.encode(),
             Path(instance.fmu.directory, "resources").absolute().as_uri().encode(),
             ctypes.byref(callbacks),
@@ -76,62 +82,49 @@ class Fmi2Instance(CtypesInstance):
         if not self._has("GetBooleanStatus"):
             return None
         wants, last = ctypes.c_int(0), ctypes.c_double(math.nan)
-        if self._do("GetBooleanStatus", _TERMINATED, ctypes.byref(wants)) != OK or not wants.value:
+        if self._do("GetBooleanStatus", fmi2Terminated, ctypes.byref(wants)) != OK or not wants.value:
             return None
         if self._has("GetRealStatus"):
-            self._do("GetRealStatus", _LAST_SUCCESSFUL_TIME, ctypes.byref(last))
+            self._do("GetRealStatus", fmi2LastSuccessfulTime, ctypes.byref(last))
         return last.value
-
-
-_LOGGER_2 = ctypes.CFUNCTYPE(
-    None, ctypes.c_void_p, ctypes.c_char_p, ctypes.c_int, ctypes.c_char_p, ctypes.c_char_p
-)
-
-
-class _Callbacks(ctypes.Structure):
-    """`fmi2CallbackFunctions`."""
-
-    _fields_ = (
-        ("logger", _LOGGER_2),
-        *((name, ctypes.c_void_p) for name in ("allocate", "free", "finished", "environment")),
-    )
-
-
-def _formatter() -> Any:
-    """Return fmpy's function that puts a native proxy before a logger; None on other platforms than its own.
-
-    Log texts of FMI 2.0 are printf formats with arguments that Python cannot read; the proxy formats them (at
-    most 2047 bytes). Its library is loaded without fmpy, of which nothing else is needed and which takes a
-    tenth of the time of a run to import.
-    """
-    spec = find_spec("fmpy")
-    for folder in (spec and spec.submodule_search_locations) or ():
-        name, suffix = platform()
-        with contextlib.suppress(OSError):
-            add = ctypes.CDLL(str(Path(folder, "logging", name, f"logging{suffix}"))).addLoggerProxy
-            add.argtypes, add.restype = [ctypes.c_void_p], None
-            return add
-    return None
-
-
-_format = _formatter()
 
 
 def _log_fmi2(
     environment: int, instance: bytes, status: int, category: bytes | None, text: bytes | None
 ) -> None:
-    receive(environment, status, category, text if _format else (text or b"").replace(b"%%", b"%"))
+    receive(environment, status, category, text)
 
 
-_logger_fmi2 = _LOGGER_2(_log_fmi2)
+def _log_unformatted(
+    environment: int, instance: bytes, status: int, category: bytes | None, text: bytes | None
+) -> None:
+    receive(environment, status, category, (text or b"").replace(b"%%", b"%"))
 
 
-def _callbacks() -> _Callbacks:
-    """Return the callback functions for one instance."""
-    memory = [ctypes.cast(call, ctypes.c_void_p) for call in (C.calloc, C.free)]
-    callbacks = _Callbacks(_logger_fmi2, *memory)
-    if _format is not None:
-        _format(ctypes.byref(callbacks))
+try:
+    from fmpy.logging import addLoggerProxy
+
+    _logger_fmi2 = fmi2CallbackLoggerTYPE(_log_fmi2)
+except (ImportError, OSError):  # no native proxy for this platform: arguments stay unformatted
+    addLoggerProxy = None
+    _logger_fmi2 = fmi2CallbackLoggerTYPE(_log_unformatted)
+
+_allocate = fmi2CallbackAllocateMemoryTYPE(calloc)
+_free = fmi2CallbackFreeMemoryTYPE(free)
+
+
+def _callbacks() -> fmi2CallbackFunctions:
+    """Return the callback functions for one instance.
+
+    Log texts of FMI 2.0 are printf formats with arguments that Python cannot read; fmpy's native proxy
+    formats them (at most 2047 bytes).
+    """
+    callbacks = fmi2CallbackFunctions()
+    callbacks.logger = _logger_fmi2
+    callbacks.allocateMemory = _allocate
+    callbacks.freeMemory = _free
+    if addLoggerProxy is not None:
+        addLoggerProxy(ctypes.byref(callbacks))
     return callbacks
 
 
@@ -182,7 +175,7 @@ class Fmi3Instance(CtypesInstance):
             ctypes.c_size_t(0),
             ctypes.c_void_p(self._listener),
             _logger_fmi3,
-            None,  # intermediate update
+            fmi3IntermediateUpdateCallback(),
         )
         return component
 
@@ -238,9 +231,7 @@ def _log_fmi3(environment: int, status: int, category: bytes | None, text: bytes
     receive(environment, status, category, text)
 
 
-_logger_fmi3 = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_int, ctypes.c_char_p, ctypes.c_char_p)(
-    _log_fmi3
-)
+_logger_fmi3 = fmi3LogMessageCallback(_log_fmi3)
 INSTANCE_TYPES: dict[int, type[CtypesInstance]] = {2: Fmi2Instance, 3: Fmi3Instance}
 """Major version of FMI -> class of its instances."""
 

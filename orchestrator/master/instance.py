@@ -1,8 +1,8 @@
 """Interface of a running FMU instance, and its implementation on the FMU's C functions through ctypes.
 
 A step call is the raw C function with arguments converted to C objects once (0.26 us instead of 0.64 us
-with the types that FMPy declares, more with its logging wrappers), on buffers that belong to the master.
-Besides, FMPy refuses to load a library that lacks any function, even one that is never called.
+with the types that fmpy declares, more with its logging wrappers), on buffers that belong to the master.
+Besides, fmpy refuses to load a library that lacks any function, even one that is never called.
 
 In FMI 3.0 an array is one variable; in a scenario its elements are separate scalars. Most exchanges of a
 step are of scalars with the precision and in the order of the master's buffer, and use it directly; others
@@ -19,6 +19,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple, Protocol
 
+import fmpy
 import numpy as np
 
 from yawbench.fmus.archive import binary_problem
@@ -32,9 +33,6 @@ from .compiled_loop import Kind, OperationData
 from .log import ERROR, FATAL, OK, STATUS, WARNING, Log, known, relisten, unlisten
 
 Status = int
-C = ctypes.CDLL(None)
-"""The C library."""
-C.dlclose.argtypes = [ctypes.c_void_p]
 
 
 class StepCalls(NamedTuple):
@@ -159,7 +157,7 @@ class CtypesInstance(FmuInstance, ABC):
         self._library = self._load(instance)
         if missing := [name for name in CORE[self.version] if not self._has(name)]:
             functions = listed(f"{self.prefix}{name}" for name in missing)
-            C.dlclose(self._library._handle)
+            fmpy.freeLibrary(self._library._handle)
             raise ModelDescriptionError(
                 f"{instance.name}: {instance.fmu.path}: its library lacks {functions}",
                 code="fmu-function-missing",
@@ -388,7 +386,7 @@ class CtypesInstance(FmuInstance, ABC):
         if self._component is not None:
             self._do("FreeInstance")
         unlisten(self._listener)
-        C.dlclose(self._library._handle)
+        fmpy.freeLibrary(self._library._handle)
 
 
 def _layout(refs: Sequence[ValueRef]) -> tuple[Any, list[int], int]:
