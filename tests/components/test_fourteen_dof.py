@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import cos, pi, radians, sin, sqrt
+from math import pi, radians, sin, sqrt
 
 import numpy as np
 import pytest
@@ -21,13 +21,11 @@ from .fourteen_dof import (
     L,
     P,
     drive,
-    four,
     lateral,
     settle,
-    wheel_values,
 )
 from .ride_energy import energy as energy_of
-from .stand import Stand
+from .stand import Stand, four, wheel_values
 
 # ---- at rest and straight ahead
 
@@ -77,16 +75,6 @@ def test_rolling_resistance_stops_the_car_and_does_not_drive_it_back():
     assert np.max(spins) > 0.5 and np.min(spins) == 0.0 == np.max(np.array(spins)[:, -1000:])
 
 
-def test_without_forces_the_spinning_car_keeps_speed_and_course():
-    stand = Stand(FourteenDof, initial_speed=22.0, initial_sideslip=-0.3, initial_yaw_rate=0.8, **FREE)
-    stand.start()
-    for _ in range(2000):
-        y = stand.step(0.001)
-    assert (y["position_x"], y["position_y"]) == pytest.approx((44 * cos(-0.3), 44 * sin(-0.3)), rel=1e-9)
-    v = complex(y["velocity_x"], y["velocity_y"]) * complex(cos(y["yaw_angle"]), sin(y["yaw_angle"]))
-    assert (v.real, v.imag) == pytest.approx((22.0 * cos(-0.3), 22.0 * sin(-0.3)), rel=1e-9)
-
-
 def test_a_freely_rolling_undamped_car_keeps_its_energy():
     stand = Stand(
         FourteenDof,
@@ -114,14 +102,6 @@ def test_a_freely_rolling_undamped_car_keeps_its_energy():
     measured("energy", "plant_fourteen_dof without dampers", "its start", off, at_most=2e-6)
     assert swinging > 80.0
     assert max(map(abs, unit.body[:3])) > 1e-4  # still moving
-
-
-def test_wheels_roll_freely_at_the_start_also_in_a_turn_and_a_drop():
-    y = Stand(
-        FourteenDof, initial_speed=20.0, initial_yaw_rate=0.5, initial_sideslip=-0.1, initial_heave=0.02
-    ).start(steer_angle=0.1)
-    assert wheel_values(y, "slip_ratio") == pytest.approx([0.0] * 4, abs=1e-15)
-    assert y["sideslip"] == pytest.approx(-0.1)
 
 
 # ---- steady states
@@ -230,28 +210,6 @@ def test_heave_and_roll_swing_with_the_frequencies_of_their_closed_forms():
     ride = stand.unit.ride
     stiffness = D * D * series(k + 2 * P.anti_roll_stiffness_front) - ride.gravity_roll
     assert frequency(roll[250:]) == pytest.approx(sqrt(stiffness / ride.roll) / (2 * pi), rel=0.02)
-
-
-# ---- coupling
-
-
-def test_after_initialization_nothing_but_the_front_slip_follows_an_input_at_once():
-    straight, steered = Stand(FourteenDof), Stand(FourteenDof)
-    straight.start()
-    steered.start()
-    y_0, y_1 = straight.step(1e-9), steered.step(1e-9, steer_angle=0.1)
-    changed = {n for n in y_0 if abs(y_0[n] - y_1[n]) > 1e-9}
-    listed = {v.name for v in FourteenDof.variables if v.depends_on}
-    assert changed == listed
-    assert {name for v in FourteenDof.variables for name in v.depends_on} == {"steer_angle"}
-
-
-HELD = {
-    "steer_angle": 0.05,
-    **lateral(3000.0),
-    **four("tyre_force_x", 100.0, -300.0, 200.0, -100.0),
-    **four("wheel_torque", -20.0, -60.0, 50.0, -30.0),
-}
 
 
 # ---- limits
