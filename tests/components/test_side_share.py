@@ -98,12 +98,6 @@ def test_the_drivers_force_comes_on_top_equal_left_and_right():
     assert added == pytest.approx([-100.0, -100.0, -300.0, -300.0], rel=1e-12)
 
 
-def test_no_moment_asks_for_no_force():
-    stand = Stand(SideShare)
-    stand.start()
-    assert forces(stand, yaw_moment=0.0, steer_angle=0.05) == [0.0] * 4
-
-
 def test_a_side_in_the_air_is_split_in_halves():
     stand = Stand(LoadProportional, side_forces="one_side_braked", **GEOMETRY)
     stand.start()

@@ -305,11 +305,5 @@ def test_the_law_has_no_memory_but_the_acceleration():
     assert stand.step(0.001, force_request_fl=-800.0) == first
 
 
-def test_an_unknown_tyre_is_refused_with_the_known_ones():
-    known = "magic_formula, magic_formula_1987, magic_formula_62, dugoff, linear"
-    with pytest.raises(AssertionError, match=known):
-        Stand(Slip, tyre="brush").start()
-
-
 def test_a_first_slip_that_is_not_a_number_ends_at_the_cap():
     assert slip_for_force(100.0, lambda kappa: 0.0, first=float("nan"), cap=0.5, share=0.8) == 0.5
