@@ -181,11 +181,12 @@ def test_the_same_sources_give_the_same_bytes_from_another_folder(checkout, tmp_
 def test_the_same_sources_give_the_same_bytes_in_another_process(tmp_path):
     """With another hash seed, so no order of a set or dictionary leaks into the archive."""
     here, there = tmp_path / "here", tmp_path / "there"
-    build_all(here, components=SOME)
-    script = f"from yawbench.fmus.build import *; build_all(Path({str(there)!r}), components={SOME})"
+    some = SOME[1:]
+    build_all(here, components=some)
+    script = f"from yawbench.fmus.build import *; build_all(Path({str(there)!r}), components={some})"
     environment = os.environ | {"PYTHONHASHSEED": "1"}
     subprocess.run([sys.executable, "-c", script], env=environment, cwd=COMPONENTS.parent, check=True)
-    for name in SOME:
+    for name in some:
         assert (here / f"{name}.fmu").read_bytes() == (there / f"{name}.fmu").read_bytes()
 
 
