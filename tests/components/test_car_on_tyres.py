@@ -204,7 +204,7 @@ def test_smooth_driving_and_braking_in_a_turn_is_of_second_order_with_split_fric
     exact_r = monolith.solve(times, steer=steer, speed=20.0, mu=mu, torque=torque, tolerance=1e-8)[2]
     sine = {"amplitude": 0.03, "frequency": 0.5, "start_time": 0.0, "periods": 100.0}
     units = [(Sine, sine), (SwellingTorque, {}), (SevenDof, {"initial_speed": 20.0}), (Dugoff, {})]
-    split = {f"friction_{w}": x for w, x in zip(WHEELS, mu, strict=True)}
+    split = four("friction", *mu)
     error = {}
     for h in (0.004, 0.001):
         found = drive(units, until=2.0, h=h, **split)[:: round(0.004 / h), 0]
@@ -271,7 +271,7 @@ def test_loads_stay_calm_when_locked_rear_wheels_brake_on_dry_road():
 
 def test_driving_off_from_rest_gives_the_acceleration_of_the_torque():
     units = [(Hold, {"angle": 0.0}), (SevenDof, {"initial_speed": 0.0}), (Dugoff, {})]
-    torque = {f"wheel_torque_{w}": 100.0 for w in WHEELS}
+    torque = four("wheel_torque", 100.0)
     v, w = drive(units, mu=0.8, until=4.0, h=0.002, read=("velocity_x", "wheel_speed_fl"), **torque)[-1]
     inertia = M + 4 * P.wheel_inertia / P.wheel_radius**2
     assert v == pytest.approx(4.0 * 400.0 / P.wheel_radius / inertia, rel=0.01)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import pi, radians, sin, sqrt
+from math import radians, sin
 
 import numpy as np
 import pytest
@@ -176,40 +176,6 @@ def test_braking_pitches_the_nose_down_and_loads_the_front_axle():
     assert y["heave"] == pytest.approx(heave, rel=1e-3)
     assert theta > 0.005
     assert y["acceleration_x"] == pytest.approx(-5000.0 / P.mass, rel=1e-12)
-
-
-def test_heave_and_roll_swing_with_the_frequencies_of_their_closed_forms():
-    """A car alike in front and rear: quarter cars, their damped lower mode."""
-    alike = {
-        "cg_to_front_axle": 1.525,
-        "cg_to_rear_axle": 1.525,
-        "spring_stiffness_rear": P.spring_stiffness_front,
-        "damping_front": 300.0,
-        "damping_rear": 300.0,
-        "anti_roll_stiffness_rear": P.anti_roll_stiffness_front,
-        "roll_centre_height_rear": P.roll_centre_height_front,
-    }
-
-    def frequency(y):
-        crossings = [k + y[k] / (y[k] - y[k + 1]) for k in range(len(y) - 1) if y[k] < 0.0 <= y[k + 1]]
-        return 500.0 * (len(crossings) - 1) / (crossings[-1] - crossings[0])
-
-    def series(k):
-        return k * P.tyre_vertical_stiffness / (k + P.tyre_vertical_stiffness)
-
-    stand = Stand(FourteenDof, initial_speed=0.0, initial_heave=0.002, **FREE, **alike)
-    stand.start()
-    heave = [stand.step(2e-3)["heave"] for _ in range(2000)]
-    k = P.spring_stiffness_front
-    assert frequency(heave[250:]) == pytest.approx(sqrt(4 * series(k) / P.sprung_mass) / (2 * pi), rel=0.02)
-
-    stand = Stand(FourteenDof, initial_speed=0.0, **FREE, **alike)
-    stand.start(**lateral(0.0))
-    settle(stand, 4.0, **four("tyre_force_y", 100.0))
-    roll = [stand.step(2e-3, **lateral(0.0))["roll_angle"] for _ in range(2000)]
-    ride = stand.unit.ride
-    stiffness = D * D * series(k + 2 * P.anti_roll_stiffness_front) - ride.gravity_roll
-    assert frequency(roll[250:]) == pytest.approx(sqrt(stiffness / ride.roll) / (2 * pi), rel=0.02)
 
 
 # ---- limits

@@ -19,7 +19,6 @@ from yawbench.components.wheel_controls.slip import SlipParameters
 from .stand import Stand
 from .tyre_curves import CAP, SHARE, curve_of, slip_limits, tyre_curve
 
-WHEELS = ("fl", "fr", "rl", "rr")
 LOADS = (300.0, 2000.0, 4000.0, 8000.0, 15000.0)
 ANGLES = (0.0, 0.03, -0.05, 0.1, 0.25, 0.6, 1.3, 2.8)
 FRICTIONS = (0.1, 0.3, 0.6, 1.0, 1.2)

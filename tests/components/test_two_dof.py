@@ -20,11 +20,10 @@ from yawbench.components.tyre_models.bakker_1987 import (
 )
 from yawbench.components.tyres.linear import LinearTyre
 from yawbench.components.tyres.magic_formula_1987 import MagicFormula1987
-from yawbench.vocabulary.wheels import WHEELS
 
 from .loop import Hold, Loop
 from .magic import forces_1987
-from .stand import Stand, four
+from .stand import Stand, four, wheel_values
 
 P = TwoDofParameters()
 M, I_Z, A, B, D, H = P.mass, P.yaw_inertia, P.cg_to_front_axle, P.cg_to_rear_axle, P.track_width, P.cg_height
@@ -150,7 +149,7 @@ def test_a_circle_is_driven_as_a_circle():
 def test_wheel_loads_carry_the_moment_of_the_lateral_acceleration_and_no_more():
     stand = Stand(TwoDof)
     y = stand.start(**four("tyre_force_y", 1000.0, 1200.0, 900.0, 1100.0))
-    fl, fr, rl, rr = (y[f"vertical_load_{w}"] for w in WHEELS)
+    fl, fr, rl, rr = wheel_values(y, "vertical_load")
     assert fl + fr == pytest.approx(M * G * B / L, rel=1e-14)
     assert rl + rr == pytest.approx(M * G * A / L, rel=1e-14)
     assert 0.5 * D * (fr - fl + rr - rl) == pytest.approx(4200.0 * H, rel=1e-12)
