@@ -12,11 +12,11 @@ import pytest
 from lxml import html
 
 import yawbench as yb
+from tests.command_line import status_of
 from tests.commands.test_output import ALWAYS, documented
 from tests.reports.browser import DESK, PHONE, Browser
 from tests.reports.flaws import check_whole, looks
 from tests.reports.made_up import data_in, unpacked
-from yawbench.cli import main
 from yawbench.figures.display import shown
 from yawbench.foundation.errors import ScenarioError
 from yawbench.measured_cars.fit_file import load_fit
@@ -84,18 +84,11 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return place
 
 
-def run(*arguments: object) -> int:
-    """Return the exit status of the command line."""
-    with pytest.raises(SystemExit) as ended:
-        main([str(one) for one in arguments])
-    return int(ended.value.code or 0)
-
-
 @pytest.fixture(scope="module")
 def fitted(folder: Path) -> tuple[Path, dict]:
     """What `yawbench fit --json` writes, and its answer."""
     with contextlib.redirect_stdout(io.StringIO()) as said:
-        assert run("fit", folder / "fit.yaml", "--out", folder / "out", "--jobs", "1", "--json") == 0
+        assert status_of("fit", folder / "fit.yaml", "--out", folder / "out", "--jobs", "1", "--json") == 0
     return folder / "out", json.loads(said.getvalue())
 
 
@@ -142,12 +135,12 @@ def test_an_interrupted_fit_goes_on(folder, monkeypatch):
 
     monkeypatch.setattr(module, "execute", stops)
     command = ("fit", folder / "fit.yaml", "--out", folder / "again", "--jobs", "1")
-    assert run(*command) == 130
+    assert status_of(*command) == 130
     before = sum(made[:3])
     assert len(list((folder / "again" / "sets").iterdir())) == before
     made.clear()
     made.extend([0] * 4)  # no further interruption
-    assert run(*command) == 0
+    assert status_of(*command) == 0
     total = json.loads((folder / "again" / "fit.json").read_text())["models"]["7 DOF"]["sets"]
     assert sum(made) == total - before + 1  # one of the held-out window
 
@@ -193,7 +186,7 @@ def test_a_fit_of_one_parameter_that_ends_where_it_began_or_at_a_bound_has_a_res
     head = FIT.partition("free:")[0]
     file = folder / "one.yaml"
     file.write_text(f"{head}most_sets: {most_sets}\nfree:\n  {free}\n")
-    assert run("fit", file, "--out", tmp_path / "out", "--jobs", "1") == 0, capsys.readouterr().err
+    assert status_of("fit", file, "--out", tmp_path / "out", "--jobs", "1") == 0, capsys.readouterr().err
     data = json.loads((tmp_path / "out" / "fit.json").read_text())
     own, _ = data["models"].values()
     (parameter,) = own["parameters"].values()

@@ -9,9 +9,9 @@ import pytest
 
 import yawbench as yb
 from docs.generate.papers import SEEDS, numbers_of
+from tests.command_line import status_of
 from tests.judged_studies import check_figures, judge_all, judge_some, verdicts
 from tests.scenarios.recorded_numbers import assert_recorded
-from yawbench.cli import main
 from yawbench.components.cars.published_cars import PaperA
 from yawbench.studies.claim_schema import si_number
 from yawbench.studies.load_experiment import load_experiment
@@ -123,9 +123,7 @@ def test_the_recorded_objectives_of_other_seeds_are_what_a_search_finds(tuning, 
     seed = 2
     with SEEDS.open(encoding="utf-8", newline="") as lines:
         rows = [row for row in csv.DictReader(lines) if (row["tuning"], row["seed"]) == (tuning, str(seed))]
-    with pytest.raises(SystemExit) as ended:
-        main(["tune", str(STUDY.with_name(f"{tuning}.yaml")), "--seed", str(seed), "--out", str(tmp_path)])
-    assert not ended.value.code
+    assert status_of("tune", STUDY.with_name(f"{tuning}.yaml"), "--seed", seed, "--out", tmp_path) == 0
     with (tmp_path / "trials.csv").open(encoding="utf-8", newline="") as lines:
         trials = [row for row in csv.DictReader(lines) if row["objective"]]
     for row in rows:
