@@ -6,9 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-import pytest
-
-from yawbench.cli import main
+from tests.command_line import status_of
 from yawbench.fmus.build import HERE as FMUS
 from yawbench.fmus.build import build_all
 from yawbench.studies.executor import left_to_do
@@ -39,9 +37,7 @@ def judge_some(file: Path, out: Path, *runs: str) -> dict[str, Any]:
 
 def judge_all(file: Path, out: Path, *options: str) -> dict[str, Any]:
     """Make all runs of a study as a user does, and return its record."""
-    with pytest.raises(SystemExit) as ended:
-        main(["study", str(file), "--out", str(out), "--fmus", str(FMUS), *options])
-    assert not ended.value.code
+    assert status_of("study", file, "--out", out, "--fmus", FMUS, *options) == 0
     return record_of(out)
 
 

@@ -8,9 +8,9 @@ from yawbench.components.cars.sprung_car import FourteenDofParameters, ride_of
 from yawbench.components.drivers.sine import Sine
 from yawbench.components.plants.fourteen_dof import FourteenDof
 from yawbench.components.tyres.magic_formula import MagicFormula
-from yawbench.vocabulary.wheels import WHEELS
 
 from .loop import Loop
+from .stand import four
 
 P = FourteenDofParameters()
 RIDE = ride_of(P)
@@ -19,15 +19,6 @@ L = A + B
 FREE = {"drag_coefficient": 0.0, "rolling_resistance": 0.0}
 SCALES = {"cornering_stiffness_scale_front": 0.611, "cornering_stiffness_scale_rear": 1.169}
 SPEED, STEER, MU = 25.0, 1.5 / 17.0, 0.4  # paper C: 90 km/h, hand wheel 1.5 rad
-
-
-def four(name, *values):
-    values = values * 4 if len(values) == 1 else values
-    return {f"{name}_{wheel}": value for wheel, value in zip(WHEELS, values, strict=True)}
-
-
-def wheel_values(y, name):
-    return [y[f"{name}_{wheel}"] for wheel in WHEELS]
 
 
 def lateral(force):

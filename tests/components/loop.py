@@ -7,10 +7,11 @@ master is tested elsewhere.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from yawbench.components.fmi.component import Component
-from yawbench.components.fmi.variables import output
+from yawbench.components.fmi.variables import output, parameter
 
 
 class Straight(Component):
@@ -22,6 +23,21 @@ class Straight(Component):
 
     def output(self, t: float, u: list[float]) -> list[float]:
         return u
+
+
+@dataclass(frozen=True)
+class HoldParameters:
+    angle: float = parameter(1e-4, "rad", "Steer angle")
+
+
+class Hold(Component):
+    """Steer angle held."""
+
+    Parameters = HoldParameters
+    outputs = ("steer_angle",)
+
+    def output(self, t: float, u: list[float]) -> list[float]:
+        return [self.p.angle]
 
 
 class Unit:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from yawbench.components.fmi.component import Component
+from yawbench.vocabulary.wheels import WHEELS
 
 
 class Stand:
@@ -68,3 +69,13 @@ class Stand:
         messages = [m.msg for m in self.unit.log_queue if m.status >= 3]
         if messages:
             raise AssertionError("\n".join(messages))
+
+
+def four(name: str, *values: float) -> dict[str, float]:
+    """Return a signal of four wheels: one value for all, or one for each."""
+    values = values * 4 if len(values) == 1 else values
+    return {f"{name}_{wheel}": value for wheel, value in zip(WHEELS, values, strict=True)}
+
+
+def wheel_values(outputs: dict[str, float], name: str) -> list[float]:
+    return [outputs[f"{name}_{wheel}"] for wheel in WHEELS]

@@ -68,18 +68,6 @@ def test_equal_shares_are_a_quarter_each():
     assert parts == pytest.approx([300.0] * 4, rel=1e-12)
 
 
-def test_a_positive_moment_brakes_the_left_and_drives_the_right():
-    for component in (LoadProportional, FixedShare):
-        fl, fr, rl, rr = forces(component, 1000.0)
-        assert fl < 0.0 < fr and rl < 0.0 < rr
-        assert fl + fr == rl + rr == 0.0
-
-
-def test_no_moment_asks_for_no_force():
-    for component in (LoadProportional, FixedShare):
-        assert forces(component, 0.0, delta=0.2) == [0.0] * 4
-
-
 @pytest.mark.parametrize("component", [LoadProportional, FixedShare])
 def test_a_wheel_without_an_arm_is_left_out_without_a_jump_and_the_others_carry_the_moment(component):
     fl, *_ = forces(component, 1000.0, delta=DEAD_ANGLE)

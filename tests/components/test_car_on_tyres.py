@@ -19,7 +19,8 @@ from yawbench.components.tyres.linear import LinearTyre
 from yawbench.vocabulary.wheels import WHEELS
 
 from . import monolith
-from .loop import Loop
+from .loop import Hold, Loop
+from .stand import four
 
 pytestmark = pytest.mark.sampled(1)
 
@@ -28,21 +29,6 @@ A, B, M, I_Z = P.cg_to_front_axle, P.cg_to_rear_axle, P.mass, P.yaw_inertia
 C_F = C_R = 100000.0
 L = A + B
 SPEED = 25.0
-
-
-@dataclass(frozen=True)
-class HoldParameters:
-    angle: float = parameter(1e-4, "rad", "Steer angle")
-
-
-class Hold(Component):
-    """Steer angle held."""
-
-    Parameters = HoldParameters
-    outputs = ("steer_angle",)
-
-    def output(self, t, u):
-        return (self.p.angle,)
 
 
 @dataclass(frozen=True)
@@ -66,12 +52,8 @@ class SwellingTorque(Component):
         return f, 0.5 * f, r, 0.5 * r
 
 
-def friction(value):
-    return {f"friction_{w}": value for w in WHEELS}
-
-
 def drive(units, *, algorithm="extrapolated", mu=0.65, until=6.0, h=0.001, read=("yaw_rate",), **constants):
-    loop = Loop(units, algorithm=algorithm, constants={**friction(mu), **constants})
+    loop = Loop(units, algorithm=algorithm, constants={**four("friction", mu), **constants})
     return np.array(loop.run(until, round(until / h), lambda now: [now[name] for name in read]))
 
 
@@ -222,7 +204,7 @@ def test_smooth_driving_and_braking_in_a_turn_is_of_second_order_with_split_fric
     exact_r = monolith.solve(times, steer=steer, speed=20.0, mu=mu, torque=torque, tolerance=1e-8)[2]
     sine = {"amplitude": 0.03, "frequency": 0.5, "start_time": 0.0, "periods": 100.0}
     units = [(Sine, sine), (SwellingTorque, {}), (SevenDof, {"initial_speed": 20.0}), (Dugoff, {})]
-    split = {f"friction_{w}": x for w, x in zip(WHEELS, mu, strict=True)}
+    split = four("friction", *mu)
     error = {}
     for h in (0.004, 0.001):
         found = drive(units, until=2.0, h=h, **split)[:: round(0.004 / h), 0]
@@ -287,27 +269,9 @@ def test_loads_stay_calm_when_locked_rear_wheels_brake_on_dry_road():
     assert a_x[-1] == pytest.approx(-1.2 * M * 9.81 * A / (inertia * L + 1.2 * M * 0.9), rel=3e-4)
 
 
-@pytest.mark.parametrize("algorithm", ["extrapolated", "gauss_seidel", "jacobi"])
-def test_the_car_brakes_to_rest_and_stays_there(algorithm):
-    units = [(Hold, {"angle": 0.0}), (SevenDof, {"initial_speed": SPEED}), (Dugoff, {})]
-    torque = {f"wheel_torque_{w}": x for w, x in zip(WHEELS, (-700.0, -700.0, -400.0, -400.0), strict=True)}
-    read = ("velocity_x", "wheel_speed_fl", "wheel_speed_rl", "acceleration_x")
-    found = drive(units, algorithm=algorithm, mu=0.8, until=6.0, read=read, **torque)
-    assert np.diff(found[:, 1]).max() <= 1e-9  # no limit cycle in the wheels
-    assert np.diff(found[:, 2]).max() <= 1e-9
-    assert found[-500:] == pytest.approx(0.0, abs=1e-6)
-    assert np.isfinite(found).all()
-
-
-def test_a_parked_car_stays_parked_with_the_wheels_turned():
-    units = [(Hold, {"angle": 0.4}), (SevenDof, {"initial_speed": 0.0}), (Dugoff, {})]
-    found = drive(units, until=0.5, read=("velocity_x", "velocity_y", "yaw_rate", "wheel_speed_fl"))
-    assert (found == 0.0).all()
-
-
 def test_driving_off_from_rest_gives_the_acceleration_of_the_torque():
     units = [(Hold, {"angle": 0.0}), (SevenDof, {"initial_speed": 0.0}), (Dugoff, {})]
-    torque = {f"wheel_torque_{w}": 100.0 for w in WHEELS}
+    torque = four("wheel_torque", 100.0)
     v, w = drive(units, mu=0.8, until=4.0, h=0.002, read=("velocity_x", "wheel_speed_fl"), **torque)[-1]
     inertia = M + 4 * P.wheel_inertia / P.wheel_radius**2
     assert v == pytest.approx(4.0 * 400.0 / P.wheel_radius / inertia, rel=0.01)

@@ -14,10 +14,9 @@ from yawbench.components.plants.eight_dof import EightDof
 from yawbench.components.plants.fourteen_dof import FourteenDof
 from yawbench.components.plants.seven_dof import SevenDof
 from yawbench.components.tyres.dugoff import Dugoff
-from yawbench.vocabulary.wheels import WHEELS
 
 from .loop import Loop
-from .stand import Stand
+from .stand import Stand, four
 
 PLANTS = (SevenDof, EightDof, FourteenDof)
 
@@ -59,9 +58,7 @@ def test_after_a_step_of_the_forces_no_acceleration_goes_beyond_its_settled_valu
     stand = Stand(plant, initial_speed=25.0, **free(plant))
     stand.start()
     stand.step(0.001)
-    found = [
-        stand.step(0.001, **{f"tyre_force_x_{w}": force for w in WHEELS})["acceleration_x"] for _ in range(20)
-    ]
+    found = [stand.step(0.001, **four("tyre_force_x", force))["acceleration_x"] for _ in range(20)]
     assert found == pytest.approx([4.0 * force / mass] * 20, rel=1e-12)
 
 
@@ -69,13 +66,13 @@ def test_after_a_step_of_the_forces_no_acceleration_goes_beyond_its_settled_valu
 @pytest.mark.parametrize("begins", [1, 10])
 def test_after_a_step_of_the_torque_no_acceleration_goes_beyond_its_settled_value(plant, begins):
     mu, torque = 0.05, -400.0  # locks the wheels, within milliseconds
-    constants = {f"friction_{w}": mu for w in WHEELS} | {f"wheel_torque_{w}": 0.0 for w in WHEELS}
+    constants = four("friction", mu) | four("wheel_torque", 0.0)
     units = [(Sine, {"amplitude": 0.0}), (plant, {"initial_speed": 25.0, **free(plant)}), (Dugoff, {})]
     loop = Loop(units, algorithm="extrapolated", constants=constants)
     found = []
     for k in range(800):
         if k == begins:
-            loop.constants |= {f"wheel_torque_{w}": torque for w in WHEELS}
+            loop.constants |= four("wheel_torque", torque)
         loop.step(0.001)
         found.append(loop["acceleration_x"])
     settled = -mu * 9.81

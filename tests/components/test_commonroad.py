@@ -20,9 +20,9 @@ from tests.evidence import measured
 from yawbench.components.fmi.component import Component
 from yawbench.components.fmi.variables import output, parameter
 from yawbench.components.plants.fourteen_dof import FourteenDof
-from yawbench.vocabulary.wheels import WHEELS
 
 from .loop import Loop
+from .stand import four
 
 pytest.importorskip("vehiclemodels", reason="needs commonroad-vehicle-models")
 
@@ -119,7 +119,7 @@ def ours(stiff=1.0):
     loop = Loop(
         [(StepSteer, {}), (FourteenDof, car(stiff)), (TheirTyre, {})],
         algorithm="extrapolated",
-        constants={f"wheel_torque_{w}": 0.0 for w in WHEELS},
+        constants=four("wheel_torque", 0.0),
     )
     names = ("yaw_rate", "roll_angle", "velocity_x")
     found = np.array(loop.run(UNTIL, len(TIMES) - 1, lambda now: [now[name] for name in names])).T

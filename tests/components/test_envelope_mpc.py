@@ -111,9 +111,3 @@ def test_beyond_sliding_the_force_is_the_grip():
     axle = BrushAxle(80000.0, 9000.0)
     assert [axle.force(x) for x in (0.5, -0.5, 2.0)] == [-9000.0, 9000.0, -9000.0]
     assert axle.slip_for(20000.0) == pytest.approx(-axle.sliding())
-
-
-@pytest.mark.parametrize(("name", "value"), [("penalty", 0.0), ("moves", 0), ("actuation", "brakes")])
-def test_impossible_programs_are_refused(name, value):
-    with pytest.raises(AssertionError, match=name):
-        Stand(EnvelopeMpc, **{name: value}).start()

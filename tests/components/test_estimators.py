@@ -14,11 +14,11 @@ from yawbench.components.mathematics.low_pass import LowPass
 from yawbench.components.tyres.dugoff import dugoff
 from yawbench.vocabulary.wheels import WHEELS
 
-from .stand import Stand
+from .stand import Stand, four
 
 V = 25.0
 RADIUS = 0.313
-ROLLING = {f"wheel_speed_{w}": V / RADIUS for w in WHEELS}
+ROLLING = four("wheel_speed", V / RADIUS)
 AXLES = {"cornering_stiffness_front": 91600.0, "cornering_stiffness_rear": 67800.0}
 both = pytest.mark.parametrize("estimator", [Kinematic, Observer])
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import cos, pi, radians, sin, sqrt
+from math import radians, sin
 
 import numpy as np
 import pytest
@@ -21,13 +21,11 @@ from .fourteen_dof import (
     L,
     P,
     drive,
-    four,
     lateral,
     settle,
-    wheel_values,
 )
 from .ride_energy import energy as energy_of
-from .stand import Stand
+from .stand import Stand, four, wheel_values
 
 # ---- at rest and straight ahead
 
@@ -77,16 +75,6 @@ def test_rolling_resistance_stops_the_car_and_does_not_drive_it_back():
     assert np.max(spins) > 0.5 and np.min(spins) == 0.0 == np.max(np.array(spins)[:, -1000:])
 
 
-def test_without_forces_the_spinning_car_keeps_speed_and_course():
-    stand = Stand(FourteenDof, initial_speed=22.0, initial_sideslip=-0.3, initial_yaw_rate=0.8, **FREE)
-    stand.start()
-    for _ in range(2000):
-        y = stand.step(0.001)
-    assert (y["position_x"], y["position_y"]) == pytest.approx((44 * cos(-0.3), 44 * sin(-0.3)), rel=1e-9)
-    v = complex(y["velocity_x"], y["velocity_y"]) * complex(cos(y["yaw_angle"]), sin(y["yaw_angle"]))
-    assert (v.real, v.imag) == pytest.approx((22.0 * cos(-0.3), 22.0 * sin(-0.3)), rel=1e-9)
-
-
 def test_a_freely_rolling_undamped_car_keeps_its_energy():
     stand = Stand(
         FourteenDof,
@@ -114,14 +102,6 @@ def test_a_freely_rolling_undamped_car_keeps_its_energy():
     measured("energy", "plant_fourteen_dof without dampers", "its start", off, at_most=2e-6)
     assert swinging > 80.0
     assert max(map(abs, unit.body[:3])) > 1e-4  # still moving
-
-
-def test_wheels_roll_freely_at_the_start_also_in_a_turn_and_a_drop():
-    y = Stand(
-        FourteenDof, initial_speed=20.0, initial_yaw_rate=0.5, initial_sideslip=-0.1, initial_heave=0.02
-    ).start(steer_angle=0.1)
-    assert wheel_values(y, "slip_ratio") == pytest.approx([0.0] * 4, abs=1e-15)
-    assert y["sideslip"] == pytest.approx(-0.1)
 
 
 # ---- steady states
@@ -196,62 +176,6 @@ def test_braking_pitches_the_nose_down_and_loads_the_front_axle():
     assert y["heave"] == pytest.approx(heave, rel=1e-3)
     assert theta > 0.005
     assert y["acceleration_x"] == pytest.approx(-5000.0 / P.mass, rel=1e-12)
-
-
-def test_heave_and_roll_swing_with_the_frequencies_of_their_closed_forms():
-    """A car alike in front and rear: quarter cars, their damped lower mode."""
-    alike = {
-        "cg_to_front_axle": 1.525,
-        "cg_to_rear_axle": 1.525,
-        "spring_stiffness_rear": P.spring_stiffness_front,
-        "damping_front": 300.0,
-        "damping_rear": 300.0,
-        "anti_roll_stiffness_rear": P.anti_roll_stiffness_front,
-        "roll_centre_height_rear": P.roll_centre_height_front,
-    }
-
-    def frequency(y):
-        crossings = [k + y[k] / (y[k] - y[k + 1]) for k in range(len(y) - 1) if y[k] < 0.0 <= y[k + 1]]
-        return 500.0 * (len(crossings) - 1) / (crossings[-1] - crossings[0])
-
-    def series(k):
-        return k * P.tyre_vertical_stiffness / (k + P.tyre_vertical_stiffness)
-
-    stand = Stand(FourteenDof, initial_speed=0.0, initial_heave=0.002, **FREE, **alike)
-    stand.start()
-    heave = [stand.step(2e-3)["heave"] for _ in range(2000)]
-    k = P.spring_stiffness_front
-    assert frequency(heave[250:]) == pytest.approx(sqrt(4 * series(k) / P.sprung_mass) / (2 * pi), rel=0.02)
-
-    stand = Stand(FourteenDof, initial_speed=0.0, **FREE, **alike)
-    stand.start(**lateral(0.0))
-    settle(stand, 4.0, **four("tyre_force_y", 100.0))
-    roll = [stand.step(2e-3, **lateral(0.0))["roll_angle"] for _ in range(2000)]
-    ride = stand.unit.ride
-    stiffness = D * D * series(k + 2 * P.anti_roll_stiffness_front) - ride.gravity_roll
-    assert frequency(roll[250:]) == pytest.approx(sqrt(stiffness / ride.roll) / (2 * pi), rel=0.02)
-
-
-# ---- coupling
-
-
-def test_after_initialization_nothing_but_the_front_slip_follows_an_input_at_once():
-    straight, steered = Stand(FourteenDof), Stand(FourteenDof)
-    straight.start()
-    steered.start()
-    y_0, y_1 = straight.step(1e-9), steered.step(1e-9, steer_angle=0.1)
-    changed = {n for n in y_0 if abs(y_0[n] - y_1[n]) > 1e-9}
-    listed = {v.name for v in FourteenDof.variables if v.depends_on}
-    assert changed == listed
-    assert {name for v in FourteenDof.variables for name in v.depends_on} == {"steer_angle"}
-
-
-HELD = {
-    "steer_angle": 0.05,
-    **lateral(3000.0),
-    **four("tyre_force_x", 100.0, -300.0, 200.0, -100.0),
-    **four("wheel_torque", -20.0, -60.0, 50.0, -30.0),
-}
 
 
 # ---- limits

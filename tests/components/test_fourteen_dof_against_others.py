@@ -26,10 +26,10 @@ from .fourteen_dof import (
     SPEED,
     STEER,
     drive,
-    four,
 )
 from .loop import Loop, Straight
 from .magic import forces_and_moment
+from .stand import four
 
 
 def test_stiff_in_heave_and_pitch_the_car_is_the_one_with_eight_degrees_of_freedom():

@@ -9,9 +9,8 @@ import pytest
 
 from yawbench.components.roads.patchwork import Patchwork
 from yawbench.vocabulary.friction_table import FrictionTable, table_of
-from yawbench.vocabulary.wheels import WHEELS
 
-from .stand import Stand
+from .stand import Stand, wheel_values
 
 X, Y = (0.0, 10.0, 25.0), (-4.0, 0.0, 3.0)
 
@@ -46,9 +45,9 @@ def test_it_lies_on_the_base_and_beneath_the_patches():
     size = {"cg_to_front_axle": 1.0, "cg_to_rear_axle": 2.0, "track_width": 2.0}
     road = Stand(Patchwork, friction_table=text, patches="0.1: x > 50", base_friction=0.9, **size)
     y = road.start(position_x=1.0)
-    assert [y[f"friction_{w}"] for w in WHEELS] == pytest.approx([0.42, 0.38, 0.9, 0.9])
+    assert wheel_values(y, "friction") == pytest.approx([0.42, 0.38, 0.9, 0.9])
     y = road.step(0.001, position_x=50.5)
-    assert [y[f"friction_{w}"] for w in WHEELS] == pytest.approx([0.1, 0.1, 0.42, 0.38])
+    assert wheel_values(y, "friction") == pytest.approx([0.1, 0.1, 0.42, 0.38])
 
 
 @pytest.mark.parametrize(

@@ -51,11 +51,6 @@ def test_gains_rise_with_steering_and_friction_and_hold_beyond_the_ranges(stand)
     assert gains(stand, -0.1, 0.0) == gains(stand, 0.0, 0.0)
 
 
-def test_the_side_of_the_turn_does_not_matter(stand):
-    for delta in (0.01, 0.04, 0.09):
-        assert gains(stand, 0.4, delta) == gains(stand, 0.4, -delta)
-
-
 def test_with_its_gains_as_constants_the_plain_law_gives_the_same_moment(stand):
     errors = dict(zip(ERRORS, (0.3, -0.02, 0.4, 0.05, 0.28, -0.05, 0.02), strict=True)) | {"velocity_x": 20.0}
     y = stand.step(0.005, steer_angle=0.05, friction=0.6, **errors)
@@ -70,8 +65,3 @@ def test_with_its_gains_as_constants_the_plain_law_gives_the_same_moment(stand):
     assert y["yaw_moment"] == pytest.approx(other["yaw_moment"], rel=1e-12)
     assert y["sliding_surface"] == other["sliding_surface"]
     assert abs(y["yaw_moment"]) > 100.0
-
-
-def test_the_moment_keeps_to_its_limit(stand):
-    errors = dict(zip(ERRORS, (1.0, 0.0, 20.0, 0.0, -1.0, 0.0, 0.0), strict=True))
-    assert stand.step(0.005, **errors, velocity_x=20.0)["yaw_moment"] == 10000.0

@@ -85,11 +85,3 @@ def test_brakes_come_in_with_the_schedule():
     assert y["scheduling"] == 1.0
     assert y["yaw_moment"] == pytest.approx(-0.105 * 20270.0 + 0.05 * 64050.0, rel=1e-6)
     assert stand.step(1e-9, **calm | {"sideslip": 0.07875})["scheduling"] == pytest.approx(0.5)
-
-
-@pytest.mark.parametrize(
-    ("name", "value"), [("boundary", 0.0), ("schedule_begin", 1.0), ("moment_scale", -1.0)]
-)
-def test_impossible_parameters_are_refused(name, value):
-    with pytest.raises(AssertionError, match=name):
-        Stand(GainScheduled, **{name: value}).start()

@@ -31,12 +31,3 @@ def test_one_step_of_growth_is_the_exponential_series_to_the_fourth_power():
 def test_the_error_falls_with_the_fourth_power_of_the_step():
     coarse, fine = (max(map(abs, oscillate(n))) for n in (100, 200))
     assert 3.9 < log2(coarse / fine) < 4.1
-
-
-def test_a_mirrored_state_gives_the_mirrored_result_to_the_last_bit():
-    def swing(t, s):
-        return s[1], -sin(s[0]) - 0.1 * s[1] ** 3
-
-    left = rk4(swing, 0.0, 0.01, (0.7, -0.3))
-    right = rk4(swing, 0.0, 0.01, (-0.7, 0.3))
-    assert left == tuple(-x for x in right)

@@ -9,13 +9,11 @@ import pytest
 from yawbench.components.actuators.lag import Lag, blend
 from yawbench.components.mathematics.first_order_lag import relax
 
-from .stand import Stand
-
-WHEELS = ("fl", "fr", "rl", "rr")
+from .stand import Stand, four
 
 
 def request(value: float) -> dict[str, float]:
-    return {f"torque_request_{wheel}": value for wheel in WHEELS}
+    return four("torque_request", value)
 
 
 def response(value: float, *, h: float, until: float, **parameters: float) -> list[tuple[float, dict]]:
@@ -48,35 +46,6 @@ def test_the_brakes_step_response_is_a_delayed_exponential(h):
 def test_a_delay_that_is_no_multiple_of_the_step_is_kept_to_the_last_digit():
     for t, y in response(100.0, h=1e-3, until=0.02, motor_delay=0.01037, motor_time_constant=0.0):
         assert y["motor_torque_fl"] == (100.0 if t > 0.01037 else 0.0)
-
-
-def test_a_ramp_in_steps_comes_out_delayed_and_lagging_as_in_the_closed_form():
-    # Held steps of a ramp: the ramp itself, half a step late.
-    h, slope, tau, delay = 1e-3, 4000.0, 0.015, 0.0045
-    stand = Stand(Lag, motor_delay=delay)
-    stand.start()
-    for k in range(150):
-        y = stand.step(h, **request(slope * (k + 0.5) * h))
-        t = (k + 1) * h
-    late = t - delay
-    assert y["motor_torque_fl"] == pytest.approx(slope * (late - tau * (1 - exp(-late / tau))), rel=1e-3)
-
-
-def test_a_held_request_may_be_split_into_any_steps():
-    requests = [300.0, -1500.0, -2500.0, 700.0, 0.0, -900.0]
-    parameters = {"brake_rate_limit": 20000.0, "motor_rate_limit": 30000.0, "motor_delay": 0.0071}
-    ends = []
-    for parts in (1, 3, 10):
-        stand = Stand(Lag, **parameters)
-        stand.start()
-        for value in requests:
-            for _ in range(parts):
-                y = stand.step(0.01 / parts, **request(value))
-        ends.append(y)
-    for other in ends[1:]:
-        for name, value in ends[0].items():
-            assert other[name] == pytest.approx(value, abs=1e-9), name
-    assert ends[0]["brake_torque_fl"] < -100.0
 
 
 @pytest.mark.parametrize(

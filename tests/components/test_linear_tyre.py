@@ -25,23 +25,12 @@ def test_forces_are_proportional_to_the_slips_whatever_load_and_friction():
         assert wheel(0.3, -0.2, load, mu) == pytest.approx((-8000.0, -15000.0))
 
 
-def test_a_lifted_wheel_has_no_force():
-    assert wheel(0.3, 0.2, 0.0, 1.0) == (0.0, 0.0)
-    assert wheel(0.3, 0.2, -1.0, 1.0) == (0.0, 0.0)
-
-
 def test_the_limit_keeps_the_direction_and_stops_at_friction():
     f_x, f_y = wheel(0.3, -0.2, 4000.0, 0.5, limited=True)
     assert hypot(f_x, f_y) == pytest.approx(2000.0)
     assert f_y / f_x == pytest.approx(15000.0 / 8000.0)
     assert wheel(0.01, 0.01, 4000.0, 0.5, limited=True) == pytest.approx((400.0, -500.0))
     assert wheel(0.01, 0.01, 4000.0, 0.0, limited=True) == (0.0, 0.0)
-
-
-@pytest.mark.parametrize(("load", "mu"), [(-100.0, 0.5), (4000.0, -0.5), (-100.0, -0.5), (0.0, 0.0)])
-@pytest.mark.parametrize("slip", [0.0, 0.3])
-def test_limited_there_is_no_force_without_load_and_friction_above_zero(load, mu, slip):
-    assert wheel(slip, slip, load, mu, limited=True) == (0.0, 0.0)
 
 
 def linear_tyre(alpha, kappa):

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 import random
-from itertools import pairwise
 from math import atan, cos, degrees, exp, hypot, isfinite, pi, radians, sin, sqrt, tan
 
 import pytest
 from scipy.optimize import minimize_scalar
 
-from tests.components.slopes import slip_stiffness
 from tests.evidence import measured
 from tests.refusals import mentions
 from yawbench.components.tyre_models.pacejka_2002 import (
@@ -184,30 +182,6 @@ def test_axle_scalings_scale_the_stiffnesses_of_their_axle_and_the_slope_of_its_
         assert found == pytest.approx(book(-0.03, 0.05, 5000.0, 1.0, plain, k_y, k_x), rel=1e-12)
 
 
-@pytest.mark.parametrize("mode", ["scale", "similarity"])
-@pytest.mark.parametrize("mu", [0.1, 0.4, 1.0])
-@pytest.mark.parametrize("f_z", LOADS)
-def test_slopes_at_the_origin_are_the_stiffnesses_on_any_friction(f_z, mu, mode):
-    c = coefficients(MagicFormulaParameters(low_friction=mode), "front")
-    df = f_z / 4000.0 - 1.0
-    slopes = slip_stiffness(lambda kappa, alpha: forces_and_moment(kappa, alpha, f_z, mu, c), 0.0, 0.0)
-    k_x = f_z * (21.51 - 0.163 * df) * exp(0.245 * df)
-    k_y = -14.95 * 4000.0 * sin(2.0 * atan(f_z / 8520.0))
-    assert slopes == pytest.approx((k_x, 0.0, 0.0, k_y), rel=1e-4, abs=1e-3)
-
-
-def test_friction_scales_the_peaks_of_pure_slip():
-    for mode in ("scale", "similarity"):
-        for mu in (0.05, 0.3, 0.8, 1.2):
-            x, _ = extreme(lambda k: tyre(k, 0.0, mu=mu, low_friction=mode)[0], -0.5 * mu, 0.0, -1)  # noqa: B023
-            y, _ = extreme(lambda a: tyre(0.0, a, mu=mu, low_friction=mode)[1], 0.0, 0.8 * mu, -1)  # noqa: B023
-            assert (x, y) == pytest.approx((-1.21 * mu * 4000.0, -0.99 * mu * 4000.0), rel=1e-6)
-
-
-def test_reference_friction_is_the_friction_at_which_the_set_holds():
-    assert tyre(-0.05, 0.04, mu=0.8, reference_friction=0.8) == tyre(-0.05, 0.04, mu=1.0)
-
-
 def test_similarity_scales_forces_and_slips_together():
     for mu in (0.1, 0.3, 1.4):
         for kappa in (-0.05, -0.01, 0.0):
@@ -217,18 +191,6 @@ def test_similarity_scales_forces_and_slips_together():
                 dry = tyre(kappa / mu, angle, SSZ2=0.0)
                 moment = dry[2] * cos(alpha) / cos(angle)  # the arm turns with the true slip angle
                 assert slippery == pytest.approx((mu * dry[0], mu * dry[1], mu * moment), rel=1e-11, abs=1e-9)
-
-
-def test_scale_keeps_the_weights_of_the_dry_tyre():
-    for mu in (0.1, 0.3, 1.4):
-        for kappa, alpha in ((-0.05, 0.1), (0.2, 0.03)):
-            ratios = [
-                (both[0] / tyre(kappa, 0.0, mu=m, low_friction="scale")[0],
-                 both[1] / tyre(0.0, alpha, mu=m, low_friction="scale")[1])
-                for m in (mu, 1.0)
-                for both in [tyre(kappa, alpha, mu=m, low_friction="scale")]
-            ]  # fmt: skip
-            assert ratios[0] == pytest.approx(ratios[1], rel=1e-12)
 
 
 def test_similarity_keeps_the_resultant_in_the_bounds_of_the_dry_tyre_and_scale_does_not():
@@ -243,47 +205,6 @@ def test_similarity_keeps_the_resultant_in_the_bounds_of_the_dry_tyre_and_scale_
     assert largest("similarity", 0.3) == pytest.approx(1.21, abs=0.005)
     assert largest("scale", 0.3) == pytest.approx(1.42, abs=0.005)
     assert largest("scale", 0.1) == pytest.approx(1.53, abs=0.005)
-
-
-@pytest.mark.parametrize("mode", ["scale", "similarity"])
-def test_combined_slip_ends_in_pure_slip(mode):
-    for kappa in (-0.3, -0.05, 0.02, 0.4):
-        pure = tyre(kappa, 0.0, low_friction=mode)
-        near = tyre(kappa, 1e-7, low_friction=mode)
-        assert pure[1:] == (0.0, 0.0)
-        assert near[0] == pytest.approx(pure[0], rel=1e-9)
-    for alpha in (-0.3, -0.05, 0.02, 0.4):
-        assert tyre(0.0, alpha, low_friction=mode)[0] == 0.0
-        near = tyre(1e-9, alpha, low_friction=mode)
-        assert near[1] == pytest.approx(tyre(0.0, alpha, low_friction=mode)[1], rel=1e-8)
-
-
-@pytest.mark.parametrize("mode", ["scale", "similarity"])
-@pytest.mark.parametrize("mu", [0.3, 1.0])
-def test_each_force_falls_with_the_slip_in_the_other_direction(mu, mode):
-    for kappa in (-0.6, -0.1, -0.01, 0.02, 0.3):
-        forces = [abs(tyre(kappa, 0.01 * i, mu=mu, low_friction=mode)[0]) for i in range(80)]
-        assert all(later < earlier or earlier == 0.0 for earlier, later in pairwise(forces))
-    for alpha in (0.01, 0.1, 0.3):
-        for sign in (1.0, -1.0):  # from the shift RHY1 of the largest side force, at kappa -0.009, on
-            steps = [-0.009 * (1.0 if mode == "scale" else mu) + sign * 0.01 * i for i in range(40)]
-            forces = [abs(tyre(interface_slip(k), alpha, mu=mu, low_friction=mode)[1]) for k in steps]
-            assert all(later < earlier or earlier == 0.0 for earlier, later in pairwise(forces))
-
-
-@pytest.mark.parametrize("mode", ["scale", "similarity"])
-def test_without_asymmetric_terms_mirrored_slip_gives_mirrored_forces_to_the_bit(mode):
-    c = coefficients(MagicFormulaParameters(low_friction=mode), "rear")
-    for kappa in SLIPS:
-        for alpha in (*ANGLES, 2.0, 3.1):
-            for mu in (0.3, 1.0):
-                x, y, z = forces_and_moment(kappa, alpha, 3700.0, mu, c)
-                assert forces_and_moment(kappa, -alpha, 3700.0, mu, c) == (x, -y, -z)
-
-
-def test_without_asymmetric_terms_zero_slip_gives_no_force():
-    for f_z in LOADS:
-        assert tyre(0.0, 0.0, f_z) == (0.0, 0.0, 0.0)
 
 
 @pytest.mark.parametrize("name", ODD)
@@ -316,19 +237,6 @@ def test_forces_stay_finite_and_bounded_at_any_slip_load_and_friction(mode, asym
                     assert hypot(*values[:2]) < 3.0 * mu * f_z
 
 
-def test_without_load_or_friction_there_is_no_force():
-    for f_z, mu in ((0.0, 1.0), (-50.0, 1.0), (4000.0, 0.0), (4000.0, -1.0), (5e-324, 1.0)):
-        assert tyre(-0.1, 0.1, f_z, mu) == (0.0, 0.0, 0.0)
-
-
-def test_above_maximum_load_everything_is_proportional_to_load():
-    at_limit = tyre(-0.05, 0.06, 12000.0)
-    assert tyre(-0.05, 0.06, 36000.0) == pytest.approx([3.0 * value for value in at_limit], rel=1e-12)
-    assert tyre(-0.05, 0.06, 8000.0, maximum_load=4000.0) == pytest.approx(
-        [2.0 * value for value in tyre(-0.05, 0.06, 4000.0)], rel=1e-12
-    )
-
-
 @pytest.mark.parametrize("asymmetric", [True, False])
 def test_curvatures_above_one_count_as_one(asymmetric):
     flat = {"PEX2": 0.0, "PEX3": 0.0, "PEY2": 0.0, "PEY3": 0.0, "QEZ2": 0.0, "QEZ4": 0.0}
@@ -336,13 +244,6 @@ def test_curvatures_above_one_count_as_one(asymmetric):
     for kappa, alpha in ((-0.05, 0.06), (0.1, -0.02)):
         expected = tyre(kappa, alpha, asymmetric_terms=asymmetric, **flat, **ones)
         assert tyre(kappa, alpha, asymmetric_terms=asymmetric, **flat, **threes) == expected
-
-
-def test_forces_oppose_the_slip_and_the_moment_aligns():
-    for alpha in (0.02, 0.05):
-        _, y, z = tyre(0.0, alpha)
-        assert y < 0.0 < z
-    assert tyre(0.05, 0.0)[0] > 0.0 > tyre(-0.05, 0.0)[0]
 
 
 def test_a_wheel_that_rolls_backwards_pushes_against_its_sliding_with_the_trail_on_the_other_side():
@@ -388,24 +289,6 @@ def test_a_set_that_changes_sign_below_maximum_load_is_refused_by_name(changed, 
         coefficients(MagicFormulaParameters(**changed), "front")
     assert mentions(str(error.value), *named)
     assert "maximum_load" in str(error.value)
-
-
-def test_the_unit_gives_each_wheel_its_own_slip_load_friction_and_axle():
-    stand = Stand(MagicFormula, cornering_stiffness_scale_rear=1.169)
-    wheels = {
-        "fl": (0.02, -0.03, 4000.0, 1.0),
-        "fr": (-0.05, 0.02, 3000.0, 0.3),
-        "rl": (0.01, 0.0, 3500.0, 0.8),
-        "rr": (0.04, -0.1, 2500.0, 0.5),
-    }
-    names = ("slip_angle", "slip_ratio", "vertical_load", "friction")
-    given = {f"{n}_{w}": x for w, values in wheels.items() for n, x in zip(names, values, strict=True)}
-    for out in (stand.start(**given), stand.step(0.001)):
-        for wheel, (alpha, kappa, f_z, mu) in wheels.items():
-            axle = "front" if wheel[0] == "f" else "rear"
-            expected = tyre(kappa, alpha, f_z, mu, axle=axle, cornering_stiffness_scale_rear=1.169)
-            found = [out[f"{n}_{wheel}"] for n in ("tyre_force_x", "tyre_force_y", "aligning_moment")]
-            assert tuple(found) == expected
 
 
 def test_the_units_defaults_are_symmetric_and_its_set_is_that_of_the_table():

@@ -7,17 +7,14 @@ from math import atan, atan2, cos, exp, hypot, pi, radians, sin, tan
 
 import pytest
 
-from tests.components.slopes import slip_stiffness
 from tests.evidence import measured
 from yawbench.components.tyre_models.bakker_1987 import (
     MagicFormula1987Parameters,
     coefficients_1987,
     loaded_tyre,
 )
-from yawbench.components.tyres.magic_formula_1987 import MagicFormula1987
 
 from .magic import forces_1987
-from .stand import Stand
 
 
 def tyre(kappa, alpha, f_z=4500.0, mu=1.0, **changed):
@@ -72,23 +69,6 @@ def test_the_measured_peak_is_nine_tenths_of_a_load_of_4500_newtons():
     )
 
 
-def test_cornering_stiffnesses_of_the_car_of_paper_d_are_those_the_paper_page_states():
-    weight, a, b = 1820.0 * 9.81, 1.463, 1.585
-    c = coefficients_1987(MagicFormula1987Parameters())
-    axles = [2.0 * loaded_tyre(0.5 * weight * arm / (a + b), 0.5, c).k_y for arm in (b, a)]
-    assert axles == pytest.approx([121700.0, 119800.0], rel=1e-3)
-
-
-@pytest.mark.parametrize("mode", ["road", "measured"])
-@pytest.mark.parametrize("mu", [0.1, 0.5, 1.0])
-def test_slopes_at_the_origin_are_the_stiffnesses_of_the_set_on_any_friction(mu, mode):
-    loaded = loaded_tyre(4500.0, mu, coefficients_1987(MagicFormula1987Parameters(peak_friction=mode)))
-    slopes = slip_stiffness(lambda kappa, alpha: forces_1987(kappa, alpha, loaded), 0.0, 0.0)
-    k_x = 100.0 * (49.6 * 4.5**2 + 226.0 * 4.5) * exp(-0.069 * 4.5)
-    k_y = 180.0 / pi * 1078.0 * sin(1.82 * atan(0.208 * 4.5))
-    assert slopes == pytest.approx((k_x, 0.0, 0.0, -k_y), rel=1e-4, abs=1e-3)
-
-
 def test_combined_slip_ends_in_pure_slip_without_a_jump():
     for kappa in (-0.3, -0.05, 0.02, 0.4):
         assert tyre(kappa, 1e-7)[0] == pytest.approx(tyre(kappa, 0.0)[0], rel=1e-6)
@@ -130,19 +110,6 @@ def test_a_locked_wheel_slides_against_its_travel_where_both_sliding_frictions_a
         assert atan2(-f_y, -f_x) == pytest.approx(alpha, abs=0.01)
 
 
-def test_without_slip_load_or_friction_there_is_no_force():
-    assert tyre(0.0, 0.0) == (0.0, 0.0)
-    for f_z, mu in ((0.0, 1.0), (-50.0, 1.0), (4000.0, 0.0), (4000.0, -1.0)):
-        assert tyre(-0.1, 0.1, f_z, mu) == (0.0, 0.0)
-
-
-def test_above_maximum_load_everything_is_proportional_to_load():
-    for mode in ("road", "measured"):
-        at_limit = tyre(-0.05, 0.06, 12000.0, peak_friction=mode)
-        tripled = [3.0 * force for force in at_limit]
-        assert tyre(-0.05, 0.06, 36000.0, peak_friction=mode) == pytest.approx(tripled, rel=1e-12)
-
-
 def test_a_wheel_that_rolls_backwards_pushes_against_its_sliding():
     x, y = tyre(-0.04, 0.1)
     assert tyre(0.04, pi - 0.1) == pytest.approx((-x, y), rel=1e-9)
@@ -165,22 +132,6 @@ def test_a_set_that_is_not_positive_up_to_maximum_load_is_refused_by_name(change
         coefficients_1987(MagicFormula1987Parameters(**changed))
     assert name in str(error.value)
     assert "maximum_load = 12000 N" in str(error.value)
-
-
-def test_the_unit_gives_each_wheel_its_own_slip_load_and_friction():
-    stand = Stand(MagicFormula1987)
-    wheels = {
-        "fl": (0.02, -0.03, 4000.0, 1.0),
-        "fr": (-0.05, 0.02, 3000.0, 0.3),
-        "rl": (0.01, 0.0, 3500.0, 0.8),
-        "rr": (0.04, -0.1, 0.0, 0.5),
-    }
-    names = ("slip_angle", "slip_ratio", "vertical_load", "friction")
-    given = {f"{n}_{w}": x for w, values in wheels.items() for n, x in zip(names, values, strict=True)}
-    for out in (stand.start(**given), stand.step(0.001)):
-        for wheel, (alpha, kappa, f_z, mu) in wheels.items():
-            found = (out[f"tyre_force_x_{wheel}"], out[f"tyre_force_y_{wheel}"])
-            assert found == tyre(kappa, alpha, f_z, mu)
 
 
 def test_the_force_direction_at_half_the_way_to_sliding_is_that_of_radt():

@@ -199,15 +199,6 @@ def test_a_set_and_its_mirror_named_for_the_other_side_agree_to_the_bit(kind):
             assert at(one, wheel, **state) == at(other, wheel, **state)
 
 
-def test_the_right_wheel_is_the_mirror_of_the_left_one_to_the_bit():
-    rng = np.random.default_rng(11)
-    stand = tyre(some_set(rng, 62.0))
-    for state in each(some_states(rng)):
-        turned = state | {"alpha": -state["alpha"], "gamma": -state["gamma"]}
-        f_x, f_y, m_z, m_x, slope = at(stand, "rl", **state)
-        assert at(stand, "rr", **turned) == (f_x, -f_y, -m_z, -m_x, slope)
-
-
 def test_a_wheel_that_rolls_backward_is_the_forward_one_reflected():
     rng = np.random.default_rng(12)
     stand = tyre(some_set(rng, 62.0))
@@ -227,13 +218,6 @@ def test_a_car_on_tyres_of_either_side_runs_straight(side):
     assert abs(loop["position_y"]) < 1e-9
     assert loop["position_x"] > 100.0
     assert abs(loop["tyre_force_y_fl"]) > 10.0  # what conicity and plysteer give, against each other
-
-
-def test_above_fzmax_forces_grow_in_proportion_to_load():
-    stand = tyre(BOOK | {"fzmax": 6000.0})
-    state = {"kappa": 0.05, "alpha": 0.08, "gamma": 0.02}
-    at_top = at(stand, f_z=6000.0, **state)
-    assert at(stand, f_z=9000.0, **state) == pytest.approx([1.5 * x for x in at_top], rel=1e-12)
 
 
 def test_the_default_set_gives_the_peaks_and_stiffnesses_tabled_for_it():

@@ -10,9 +10,8 @@ import pytest
 
 from yawbench.components.roads.patchwork import Patchwork, inclination, section
 from yawbench.vocabulary.patches import friction_at, patches_of
-from yawbench.vocabulary.wheels import WHEELS
 
-from .stand import Stand
+from .stand import Stand, wheel_values
 from .test_conformance import mirrored
 
 SIZE = {"cg_to_front_axle": 1.0, "cg_to_rear_axle": 2.0, "track_width": 1.5}
@@ -82,12 +81,12 @@ def test_a_slip_in_the_text_is_told(text, said):
 def test_each_wheel_has_the_friction_of_its_place():
     road = Stand(Patchwork, patches="0.1: x > 0.5, y > 0; 0.3: x < -0.5, y < 0", **SIZE)
     y = road.start()
-    assert [y[f"friction_{w}"] for w in WHEELS] == [0.1, 0.9, 0.9, 0.3]
+    assert wheel_values(y, "friction") == [0.1, 0.9, 0.9, 0.3]
     assert y["friction"] == pytest.approx(0.55)
     y = road.step(0.001, yaw_angle=pi)  # turned about: the rear is where the front was
-    assert [y[f"friction_{w}"] for w in WHEELS] == [0.3, 0.9, 0.9, 0.1]
+    assert wheel_values(y, "friction") == [0.3, 0.9, 0.9, 0.1]
     y = road.step(0.001, yaw_angle=0.0, position_x=1.6)
-    assert [y[f"friction_{w}"] for w in WHEELS] == [0.1, 0.9, 0.9, 0.9]
+    assert wheel_values(y, "friction") == [0.1, 0.9, 0.9, 0.9]
 
 
 @pytest.mark.parametrize(

@@ -65,12 +65,6 @@ def test_too_little_yaw_rate_asks_for_a_positive_moment_and_too_little_sideslip_
     assert moment(component, sideslip_ref=0.01) < -25.0
 
 
-@pytest.mark.parametrize("component", [PidController, FuzzyPid])
-def test_the_moment_is_limited_and_fades_out_at_rest(component):
-    assert moment(component, yaw_rate_ref=9.0) == 5000.0
-    assert moment(component, yaw_rate_ref=9.0, velocity_x=0.0) == 0.0
-
-
 def schedule(reading="mirrored", derivative=100.0):
     p = FuzzyPidParameters(
         table_reading=reading,

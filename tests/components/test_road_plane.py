@@ -14,10 +14,9 @@ from yawbench.components.plants.two_dof import TwoDof
 from yawbench.components.roads.patchwork import Patchwork
 from yawbench.components.tyres.magic_formula_62_transient import MagicFormula62Transient
 from yawbench.vocabulary.gravity import G
-from yawbench.vocabulary.wheels import WHEELS
 
 from .loop import Loop
-from .stand import Stand
+from .stand import Stand, four, wheel_values
 
 FREE = {"drag_coefficient": 0.0, "rolling_resistance": 0.0}
 PLANTS = {SevenDof: {}, EightDof: FREE, FourteenDof: FREE}
@@ -41,13 +40,12 @@ def held(stand, seconds, h=0.004, **inputs):
 def forces(p, *, x=0.0, y=0.0):
     """Return tyre forces that add up to x, y [N] and turn nothing."""
     a, b = p.cg_to_front_axle, p.cg_to_rear_axle
-    share = {"f": 0.5 * b / (a + b), "r": 0.5 * a / (a + b)}
-    along = {f"tyre_force_x_{w}": 0.25 * x for w in WHEELS}
-    return along | {f"tyre_force_y_{w}": share[w[0]] * y for w in WHEELS}
+    front, rear = 0.5 * b / (a + b) * y, 0.5 * a / (a + b) * y
+    return four("tyre_force_x", 0.25 * x) | four("tyre_force_y", front, front, rear, rear)
 
 
 def loads(y):
-    return [y[f"vertical_load_{w}"] for w in WHEELS]
+    return wheel_values(y, "vertical_load")
 
 
 def test_a_level_road_without_wind_changes_no_bit():
@@ -136,12 +134,12 @@ def test_the_winds_moment_turns_the_car(plant):
 
 
 def test_a_braked_car_stands_on_a_slope_on_tyres_with_relaxation_lengths():
-    braked = {f"wheel_torque_{w}": -900.0 for w in WHEELS} | {f"friction_{w}": 0.9 for w in WHEELS}
+    braked = four("wheel_torque", -900.0) | four("friction", 0.9)
     units = [(EightDof, {"initial_speed": 0.5}), (MagicFormula62Transient, {})]
     loop = Loop(units, algorithm="extrapolated", constants={"slope": 0.1, **braked})
     loop.run(4.0, 2000, lambda _: None)
     assert abs(loop["velocity_x"]) < 1e-8
-    held = sum(loop[f"tyre_force_x_{w}"] for w in WHEELS)
+    held = sum(wheel_values(loop, "tyre_force_x"))
     assert held == pytest.approx(EightDof.Parameters().mass * G * sin(0.1), rel=1e-4)
 
 
@@ -165,4 +163,4 @@ def test_a_car_that_slides_turning_over_an_inclined_plane_flies_the_parabola_and
     assert kinetic + G * height == pytest.approx(0.5 * speed**2, rel=1e-6)
     normal = sqrt(1.0 - sin(sigma) ** 2 - sin(epsilon) ** 2)
     weight = loop.units[0].slave.p.mass * G * normal
-    assert sum(loop[f"vertical_load_{w}"] for w in WHEELS) == pytest.approx(weight, rel=1e-6)
+    assert sum(wheel_values(loop, "vertical_load")) == pytest.approx(weight, rel=1e-6)

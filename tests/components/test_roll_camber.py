@@ -11,7 +11,7 @@ from yawbench.components.tyres.magic_formula_62 import MagicFormula62
 from yawbench.vocabulary.wheels import WHEELS, wheels
 
 from .loop import Loop
-from .stand import Stand
+from .stand import Stand, wheel_values
 
 PLANTS = pytest.mark.parametrize("plant", [EightDof, FourteenDof])
 
@@ -24,7 +24,7 @@ def test_wheels_lean_by_their_axles_share_of_the_roll_to_the_outside_of_the_turn
     for _ in range(300):
         y = stand.step(0.005, **to_the_left)
     assert y["roll_angle"] > 0.01  # the left side rises, tops of the wheels go to the right
-    told = [y[f"inclination_angle_{wheel}"] for wheel in WHEELS]
+    told = wheel_values(y, "inclination_angle")
     assert told == pytest.approx([share * y["roll_angle"] for share in (0.8, 0.8, 0.3, 0.3)], rel=1e-12)
 
 

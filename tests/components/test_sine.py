@@ -6,7 +6,7 @@ from math import exp, pi, sin
 
 import pytest
 
-from yawbench.components.drivers.sine import Sine, SineParameters, sine_steer
+from yawbench.components.drivers.sine import SineParameters, sine_steer
 from yawbench.components.drivers.sine_sweep import SineSweepParameters, sweep
 from yawbench.components.drivers.sine_with_dwell import (
     SineWithDwell,
@@ -35,21 +35,6 @@ def test_the_first_quarter_is_to_the_left_with_the_full_amplitude():
 def test_mean_steer_angle_over_whole_periods_is_zero():
     n = 4000
     assert abs(sum(sine_steer(1.0 + 4.0 * k / n, P) for k in range(n))) / n < 1e-16
-
-
-def test_the_value_does_not_depend_on_how_time_was_reached():
-    one, many = Stand(Sine, frequency=0.5), Stand(Sine, frequency=0.5)
-    one.start()
-    many.start()
-    for _ in range(16):
-        last = many.step(0.09375)
-    assert one.step(1.5) == last
-
-
-def test_the_drive_force_is_constant():
-    stand = Stand(Sine, constant_drive_force=-300.0)
-    assert stand.start()["drive_force"] == -300.0
-    assert stand.step(1.25)["drive_force"] == -300.0
 
 
 DWELL = SineWithDwellParameters(amplitude=2.0, start_time=1.0)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
 from math import atan, cos, pi, sin
 
 import numpy as np
@@ -11,7 +10,6 @@ from scipy.linalg import expm
 
 from yawbench.components.cars.single_track_car import SingleTrackCar
 from yawbench.components.references.single_track import G, SingleTrack, SingleTrackParameters
-from yawbench.components.references.steady_state import SteadyState
 
 from .stand import Stand
 
@@ -46,17 +44,6 @@ def test_it_settles_at_the_steady_state_of_the_printed_equations(mode, v):
     assert y["yaw_acceleration_ref"] == pytest.approx(0.0, abs=1e-9)
 
 
-def test_the_steady_state_is_that_of_the_other_reference_unit():
-    shared = {f.name for f in fields(SteadyState.Parameters)} & {f.name for f in fields(P)}
-    other = Stand(
-        SteadyState, limited=False, **{name: getattr(P, name) for name in shared if name != "friction_share"}
-    )
-    expected = other.start(steer_angle=0.03, velocity_x=30.0)
-    y = Stand(SingleTrack, **UNLIMITED).start(steer_angle=0.03, velocity_x=30.0)
-    assert y["yaw_rate_ref"] == pytest.approx(expected["yaw_rate_ref"], rel=1e-12)
-    assert y["sideslip_ref"] == pytest.approx(expected["sideslip_ref"], rel=1e-12)
-
-
 def test_the_dynamic_model_answers_a_ramp_as_the_matrix_exponential():
     v, slope = 25.0, 0.1
     system, entry = matrices(v)
@@ -69,22 +56,6 @@ def test_the_dynamic_model_answers_a_ramp_as_the_matrix_exponential():
         beta, r = (expm(whole * 0.01 * (k + 1)) @ np.array([0.0, 0.0, 0.0, slope]))[:2]
         assert y["yaw_rate_ref"] == pytest.approx(r, abs=2e-6)
         assert y["sideslip_ref"] == pytest.approx(beta, abs=2e-6)
-
-
-def test_the_dynamic_model_has_the_frequency_response_of_the_printed_equations():
-    v, omega = 20.0, 2 * pi * 1.5
-    system, entry = matrices(v)
-    gain = np.linalg.solve(1j * omega * np.eye(2) - system, entry)
-    stand = Stand(SingleTrack, mode="dynamic", **UNLIMITED)
-    stand.start(velocity_x=v)
-    h = 0.001
-    for k in range(3000):
-        t = (k + 1) * h
-        y = stand.step(h, steer_angle=0.01 * sin(omega * t), velocity_x=v)
-        if t > 2.0:
-            expected = 0.01 * (gain * np.exp(1j * omega * t)).imag
-            assert y["sideslip_ref"] == pytest.approx(expected[0], abs=1e-6)
-            assert y["yaw_rate_ref"] == pytest.approx(expected[1], abs=1e-6)
 
 
 @pytest.mark.parametrize("mode", ["steady_state", "dynamic"])

@@ -6,18 +6,16 @@ import math
 
 import pytest
 
-from yawbench.components.allocators.single_wheel import FL, FR, RL, RR, SingleWheel, chosen_wheel
+from yawbench.components.allocators.single_wheel import FL, FR, RL, RR, SingleWheel
 from yawbench.components.cars.wheel_kinematics import lever_arms
 from yawbench.components.tyres.magic_formula import MagicFormula
 from yawbench.components.wheel_controls.hydraulic import Hydraulic, HydraulicParameters, asked_pressure
 
-from .stand import Stand
-
-WHEELS = ("fl", "fr", "rl", "rr")
+from .stand import Stand, wheel_values
 
 
 def forces(outputs):
-    return [outputs[f"force_request_{wheel}"] for wheel in WHEELS]
+    return wheel_values(outputs, "force_request")
 
 
 def request(*, moment, delta, dr, drive=0.0, **parameters):
@@ -25,13 +23,6 @@ def request(*, moment, delta, dr, drive=0.0, **parameters):
     return forces(
         stand.start(yaw_moment=moment, steer_angle=delta, yaw_rate=dr, yaw_rate_ref=0.0, drive_force=drive)
     )
-
-
-@pytest.mark.parametrize(
-    "delta, dr, wheel", [(0.05, 0.1, FR), (0.05, -0.1, RL), (-0.05, 0.1, RR), (-0.05, -0.1, FL)]
-)
-def test_the_rule_names_the_wheel_of_each_row(delta, dr, wheel):
-    assert chosen_wheel(delta, dr) == wheel
 
 
 def test_straight_ahead_left_and_right_are_alike_but_as_printed():

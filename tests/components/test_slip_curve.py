@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from itertools import pairwise, product
-from math import sin
 
 import pytest
 from scipy.optimize import brentq
@@ -17,11 +16,9 @@ from yawbench.components.tyres.magic_formula_1987 import MagicFormula1987
 from yawbench.components.wheel_controls.slip import TYRES as KNOWN
 from yawbench.components.wheel_controls.slip import SlipParameters
 
-from .slopes import slip_stiffness
 from .stand import Stand
 from .tyre_curves import CAP, SHARE, curve_of, slip_limits, tyre_curve
 
-WHEELS = ("fl", "fr", "rl", "rr")
 LOADS = (300.0, 2000.0, 4000.0, 8000.0, 15000.0)
 ANGLES = (0.0, 0.03, -0.05, 0.1, 0.25, 0.6, 1.3, 2.8)
 FRICTIONS = (0.1, 0.3, 0.6, 1.0, 1.2)
@@ -161,8 +158,3 @@ def test_each_axle_has_its_own_stiffness():
     p = SlipParameters(slip_stiffness_scale_front=0.8, slip_stiffness_scale_rear=1.2)
     front, rear = [curve_of(p, axle)[0](1e-6) for axle in ("front", "rear")]
     assert front / rear == pytest.approx(0.8 / 1.2, rel=1e-4)
-
-
-def test_slip_stiffness_of_a_known_function_is_its_gradient():
-    slopes = slip_stiffness(lambda k, a: (k * k + 3.0 * a, sin(k) * a, 7.0), 0.2, 0.3)
-    assert slopes == pytest.approx((0.4, 3.0, 0.3 * 0.98006658, 0.19866933), rel=1e-7)

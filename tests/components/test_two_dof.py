@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cache
 from math import atan2, cos, log2, pi, sin
 
@@ -13,8 +12,6 @@ from scipy.integrate import solve_ivp
 from tests.evidence import measured
 from yawbench.components.cars.load_transfer import quasi_static_loads
 from yawbench.components.drivers.sine import Sine
-from yawbench.components.fmi.component import Component
-from yawbench.components.fmi.variables import parameter
 from yawbench.components.plants.two_dof import TwoDof, TwoDofParameters
 from yawbench.components.tyre_models.bakker_1987 import (
     MagicFormula1987Parameters,
@@ -23,37 +20,15 @@ from yawbench.components.tyre_models.bakker_1987 import (
 )
 from yawbench.components.tyres.linear import LinearTyre
 from yawbench.components.tyres.magic_formula_1987 import MagicFormula1987
-from yawbench.vocabulary.roles import ROLES
-from yawbench.vocabulary.wheels import WHEELS, wheels
 
-from .loop import Loop
+from .loop import Hold, Loop
 from .magic import forces_1987
-from .stand import Stand
+from .stand import Stand, four, wheel_values
 
 P = TwoDofParameters()
 M, I_Z, A, B, D, H = P.mass, P.yaw_inertia, P.cg_to_front_axle, P.cg_to_rear_axle, P.track_width, P.cg_height
 L = A + B
 SPEED, G = 25.0, 9.81
-
-
-def four(name, *values):
-    values = values * 4 if len(values) == 1 else values
-    return {f"{name}_{wheel}": value for wheel, value in zip(WHEELS, values, strict=True)}
-
-
-@dataclass(frozen=True)
-class HoldParameters:
-    angle: float = parameter(1e-4, "rad", "Steer angle")
-
-
-class Hold(Component):
-    """Steer angle held."""
-
-    Parameters = HoldParameters
-    outputs = ("steer_angle",)
-
-    def output(self, t, u):
-        return (self.p.angle,)
 
 
 def drive(
@@ -141,15 +116,6 @@ def test_under_a_yaw_moment_alone_the_car_turns_with_the_moment_over_its_inertia
     assert y["velocity_x"] == SPEED
 
 
-@pytest.mark.parametrize(("wheel", "arm"), [("fl", A), ("fr", A), ("rl", -B), ("rr", -B)])
-def test_each_lateral_force_turns_the_straight_car_with_its_lever_arm(wheel, arm):
-    stand = Stand(TwoDof)
-    stand.start()
-    y = stand.step(0.01, **{f"tyre_force_y_{wheel}": 500.0})
-    assert y["yaw_rate"] == pytest.approx(0.01 * 500.0 * arm / I_Z, rel=1e-12)
-    assert y["velocity_y"] == pytest.approx(0.01 * (500.0 / M - SPEED * 0.5 * y["yaw_rate"]), rel=1e-12)
-
-
 def test_a_steered_front_force_has_a_part_along_the_track():
     stand = Stand(TwoDof)
     stand.start(steer_angle=0.3)
@@ -183,7 +149,7 @@ def test_a_circle_is_driven_as_a_circle():
 def test_wheel_loads_carry_the_moment_of_the_lateral_acceleration_and_no_more():
     stand = Stand(TwoDof)
     y = stand.start(**four("tyre_force_y", 1000.0, 1200.0, 900.0, 1100.0))
-    fl, fr, rl, rr = (y[f"vertical_load_{w}"] for w in WHEELS)
+    fl, fr, rl, rr = wheel_values(y, "vertical_load")
     assert fl + fr == pytest.approx(M * G * B / L, rel=1e-14)
     assert rl + rr == pytest.approx(M * G * A / L, rel=1e-14)
     assert 0.5 * D * (fr - fl + rr - rl) == pytest.approx(4200.0 * H, rel=1e-12)
@@ -194,24 +160,6 @@ def test_a_wheel_that_lifts_leaves_its_load_to_the_other():
     y = Stand(TwoDof, cg_height=1.2).start(**four("tyre_force_y", 4500.0))
     assert (y["vertical_load_fl"], y["vertical_load_rl"]) == (0.0, 0.0)
     assert y["vertical_load_fr"] == pytest.approx(M * G * B / L)
-
-
-def test_slips_are_those_of_freely_rolling_wheels():
-    y = Stand(TwoDof, initial_yaw_rate=0.4, initial_sideslip=-0.1).start(steer_angle=0.1)
-    v_x, v_y = SPEED * cos(-0.1), SPEED * sin(-0.1)
-    places = ((A, D / 2, 0.1), (A, -D / 2, 0.1), (-B, D / 2, 0.0), (-B, -D / 2, 0.0))
-    for wheel, (x, side, angle) in zip(WHEELS, places, strict=True):
-        assert y[f"slip_ratio_{wheel}"] == 0.0
-        expected = atan2(v_y + 0.4 * x, v_x - 0.4 * side) - angle
-        assert y[f"slip_angle_{wheel}"] == pytest.approx(expected, rel=1e-12)
-
-
-def test_it_shows_what_a_plant_must_show():
-    shown = {v.name for v in TwoDof.variables}
-    role = ROLES["plants"]
-    for pattern in (*role.inputs, *role.outputs):
-        assert set(wheels(pattern)) <= shown
-    assert TwoDof.fmu_name == "plant_two_dof"
 
 
 # ---- an independent solution
@@ -273,20 +221,3 @@ def test_the_coupled_car_agrees_with_an_independent_solution_to_second_order():
     car, scipy = "plant_two_dof, tyre_magic_formula_1987", "scipy, one system of equations"
     measured("cars", car, scipy, fine.max(), at_most=1e-4)
     measured("order", f"`extrapolated`, {car}", scipy, log2(coarse[1] / fine[1]) / 2, at_least=1.8)
-
-
-def test_what_follows_an_input_at_once_is_what_the_model_structure_lists():
-    straight, steered = Stand(TwoDof), Stand(TwoDof)
-    straight.start()
-    steered.start()
-    y_0 = straight.step(1e-9)
-    y_1 = steered.step(1e-9, steer_angle=0.1, yaw_moment=1.0)
-    changed = {n for n in y_0 if abs(y_0[n] - y_1[n]) > 1e-9}
-    assert changed == {v.name for v in TwoDof.variables if v.depends_on}
-
-
-def test_without_control_the_papers_manoeuvre_loses_the_car():
-    sine = {"amplitude": 0.14, "frequency": 0.5, "start_time": 0.5}
-    beta, v_x = drive(record=["sideslip", "velocity_x"], driver=(Sine, sine), until=3.5)
-    assert np.degrees(np.abs(beta).max()) > 20.0
-    assert np.all(v_x == SPEED)

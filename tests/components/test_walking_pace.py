@@ -16,18 +16,13 @@ from yawbench.components.tyres.dugoff import Dugoff
 from yawbench.components.tyres.linear import LinearTyre
 from yawbench.components.tyres.magic_formula import MagicFormula
 from yawbench.components.tyres.magic_formula_1987 import MagicFormula1987
-from yawbench.vocabulary.wheels import WHEELS
 
 from . import monolith, monolith_b
 from .loop import Loop
 from .magic import forces_and_moment
+from .stand import four
 
 pytestmark = pytest.mark.sampled(1)
-
-
-def four(name, *values):
-    values = values * 4 if len(values) == 1 else values
-    return {f"{name}_{wheel}": value for wheel, value in zip(WHEELS, values, strict=True)}
 
 
 class SilentDugoff(Dugoff):

@@ -76,11 +76,3 @@ def test_the_drivers_force_stays_and_the_moment_is_added_to_it():
     arms = lever_arms(0.0, 1.4, 0.8)
     assert alone == pytest.approx([-1200.0, -1200.0, -800.0, -800.0])
     assert (x - alone) @ arms == pytest.approx(1500.0, rel=0.02)
-
-
-@pytest.mark.parametrize(
-    ("name", "value"), [("moment_weight", 0.0), ("usable_grip", 0.0), ("force_weight", -1.0)]
-)
-def test_impossible_weights_are_refused(name, value):
-    with pytest.raises(AssertionError, match=name):
-        forces(1000.0, **{name: value})

@@ -35,11 +35,6 @@ def test_wheel_velocities_are_those_of_a_turning_rigid_body_in_wheel_axes():
         assert found[4 + i] == pytest.approx(wheel.imag, rel=1e-14)
 
 
-def test_mirrored_motion_gives_mirrored_wheel_velocities_to_the_last_bit():
-    fl, fr, rl, rr, s_fl, s_fr, s_rl, s_rr = velocities(17.3, -2.1, 0.61, 0.21)
-    assert velocities(17.3, 2.1, -0.61, -0.21) == (fr, fl, rr, rl, -s_fr, -s_fl, -s_rr, -s_rl)
-
-
 def test_a_turn_about_the_rear_axle_without_slip_needs_the_ackermann_angle():
     radius = 20.0
     r = 5.0 / radius

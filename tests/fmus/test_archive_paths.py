@@ -13,11 +13,11 @@ from pathlib import Path
 import pytest
 
 from tests.changed import changed
+from tests.command_line import status_of
 from tests.fmus.fake_fmus import Var, make_fmu
 from tests.interop.test_ssp_values import description, inline, parameter, parameters
 from tests.orchestrator.test_foreign import write_fmu
 from tests.refusals import texts_of
-from yawbench.cli import main
 from yawbench.fmus.archive import open_fmu
 from yawbench.foundation.errors import YawbenchError
 from yawbench.orchestrator.results.reader import load_results
@@ -184,7 +184,5 @@ def test_an_fmu_packed_with_dots_runs(prefix, library, tmp_path, capsys):
     (tmp_path / "s.yaml").write_text(
         "stop_time: 1\nstep_size: 0.1\nunits: {g: {fmu: ./g.fmu}}\ninputs: {g.Real_in: 2}\n"
     )
-    with pytest.raises(SystemExit) as exit_:
-        main(["run", str(tmp_path / "s.yaml"), "--out", str(tmp_path / "out")])
-    assert not exit_.value.code, capsys.readouterr().err
+    assert status_of("run", tmp_path / "s.yaml", "--out", tmp_path / "out") == 0, capsys.readouterr().err
     assert load_results(tmp_path / "out")["g.Real_out"][-1] == 4.0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 
-from tests.fmus.bare import DISCARD, ERROR, FATAL, OK, Unit
+from tests.fmus.bare import ERROR, OK, Unit
 from tests.refusals import each_mentions
 
 
@@ -76,25 +76,3 @@ def test_no_instance_is_refused(sample):
     assert library.fmi2DoStep(None, ctypes.c_double(0.0), ctypes.c_double(0.1), 1) == ERROR
     assert library.fmi2GetReal(None, None, ctypes.c_size_t(0), None) == ERROR
     library.fmi2FreeInstance(None)
-
-
-def test_a_state_needs_room_to_be_serialized(sample):
-    unit = Unit(sample("controllers/failing.py"))
-    unit.start()
-    state = unit.save()
-    room = (ctypes.c_char * 4)()
-    assert unit.call("fmi2SerializeFMUstate", state, room, ctypes.c_size_t(4)) == ERROR
-    assert "too small" in unit.messages[0]
-    unit.free()
-
-
-def test_what_pythonfmu_does_not_support_is_an_error_not_a_crash(sample):
-    unit = Unit(sample("controllers/failing.py"))
-    unit.start()
-    value = (ctypes.c_double * 1)(0.0)
-    reference, one = (ctypes.c_uint * 1)(0), ctypes.c_size_t(1)
-    assert unit.call("fmi2GetDirectionalDerivative", reference, one, reference, one, value, value) == ERROR
-    assert unit.call("fmi2CancelStep") == ERROR
-    unit.step(0.0)
-    assert unit.try_step(0.001) not in (DISCARD, FATAL)
-    unit.free()

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.fmus.bare import ERROR, OK, Fmu, Refused, Unit
+from tests.fmus.bare import Fmu, Refused, Unit
 from tests.fmus.programs import in_windows, in_wine, run, ten_steps
 from tests.refusals import each_mentions, mentions, refused
 from yawbench.commands.new import begin
@@ -178,12 +178,6 @@ def test_a_restored_state_goes_on_as_the_first_time(unit):
     unit.restore(saved)
     unit.step(0.1, 0.1)
     assert unit.outputs() == expected
-
-
-def test_what_it_cannot_do_is_an_error_with_a_message_not_a_crash(unit):
-    assert unit.call("fmi2CancelStep") == ERROR
-    assert mentions(unit.messages[-1], "fmi2CancelStep", "supported")
-    assert unit.call("fmi2GetInteger", None, 0, None) == OK
 
 
 def test_it_runs_in_a_c_host_without_python(fmu, tmp_path, host):

@@ -25,7 +25,7 @@ LAST_SUCCESSFUL_TIME = 2
 pytestmark = [
     pytest.mark.parametrize("runs_as", ["native", "python"]),
     pytest.mark.parametrize("name", [IN_C, *find_components()]),
-    pytest.mark.sampled(12),
+    pytest.mark.sampled(7),
 ]
 
 
@@ -140,13 +140,13 @@ def test_calls_out_of_order_are_refused_and_change_nothing(unit):
     unit.step(0.0, H)
 
 
-@pytest.mark.parametrize("h", [0.0, -H, math.nan, math.inf, -math.inf, 1e300])
-def test_a_step_that_is_not_positive_or_longer_than_a_day_is_refused(unit, h):
+def test_a_step_that_is_not_positive_or_longer_than_a_day_is_refused(unit):
     started(unit)
     unit.step(0.0, H)
     before = unit.outputs()
-    assert mentions(step_refused(unit, H, h), "fmi2DoStep", "86400 s", f"{h:g} s")
-    assert (reached(unit), unit.outputs()) == (H, before)
+    for h in (0.0, -H, math.nan, math.inf, -math.inf, 1e300):
+        assert mentions(step_refused(unit, H, h), "fmi2DoStep", "86400 s", f"{h:g} s")
+        assert (reached(unit), unit.outputs()) == (H, before)
     unit.step(H, H)
 
 
@@ -344,15 +344,15 @@ def test_pointers_that_are_null_are_refused_with_a_sentence(unit):
     unit.step(0.0, H)
 
 
-@pytest.mark.parametrize("times", ["sums", "products", "whole nanoseconds", "single precision"])
-def test_times_that_hosts_round_are_taken(unit, times):
+def test_times_that_hosts_round_are_taken(unit):
     third, n = 0.001 / 3, 400
-    points = {
-        "sums": lambda k: sum([third] * k, 7.0),
-        "products": lambda k: 7.0 + k * third,
-        "whole nanoseconds": lambda k: round((7.0 + k * third) * 1e9) * 1e-9,
-        "single precision": lambda k: ctypes.c_float(7.0 + k * third).value,
-    }[times]
-    started(unit, 7.0, points(n))
-    for k in range(n):
-        unit.step(points(k), third)
+    for points in (
+        lambda k: sum([third] * k, 7.0),
+        lambda k: 7.0 + k * third,
+        lambda k: round((7.0 + k * third) * 1e9) * 1e-9,  # whole nanoseconds
+        lambda k: ctypes.c_float(7.0 + k * third).value,
+    ):
+        started(unit, 7.0, points(n))
+        for k in range(n):
+            unit.step(points(k), third)
+        unit.do("fmi2Reset")

@@ -204,11 +204,6 @@ def test_a_file_that_is_no_zip_is_said(fmu: Path) -> None:
     assert mentions(problem(fmu), "tyre_a.fmu", "zip", "archive")
 
 
-def test_an_archive_that_was_cut_off_is_said(fmu: Path) -> None:
-    fmu.write_bytes(fmu.read_bytes()[:-40])
-    assert mentions(problem(fmu), "tyre_a.fmu", "File")
-
-
 def test_an_archive_with_a_flipped_byte_is_said(tmp_path: Path, cache: Path) -> None:
     path = tmp_path / "a.fmu"
     with zipfile.ZipFile(path, "w", zipfile.ZIP_STORED) as archive:
@@ -225,92 +220,40 @@ def test_every_cut_of_an_archive_gives_one_sentence(fmu: Path, cache: Path) -> N
     assert not list(cache.glob("*"))
 
 
-def test_a_zip_that_is_no_fmu_is_said(tmp_path: Path, cache: Path) -> None:
-    path = tmp_path / "a.fmu"
-    with zipfile.ZipFile(path, "w") as archive:
-        archive.writestr("readme.txt", "hello")
-    assert mentions(problem(path), "a.fmu", "modelDescription.xml")
-
-
-@pytest.mark.parametrize("name", ["../evil.txt", "/etc/evil.txt", "resources/../../evil.txt", "C:/evil.txt"])
-def test_an_archive_that_reaches_out_of_its_folder_is_refused(name: str, tmp_path: Path, cache: Path) -> None:
-    path = make_fmu(tmp_path / "a.fmu", files={name: b"evil"})
-    assert mentions(problem(path), "a.fmu", f"'{name}'")
-    assert not list(tmp_path.rglob("evil.txt"))
+ONE_OUTPUT = model_description("a", outputs=["x"])
 
 
 @pytest.mark.parametrize(
-    ("xml", "expected"),
+    ("xml", "names"),
     [
-        (
-            "<fmiModelDescription",
-            "modelDescription.xml is not well-formed XML: unclosed token: line 1, column 0",
-        ),
-        (
-            '<html fmiVersion="2.0"/>',
-            "modelDescription.xml is not an FMI model description; "
-            "supported are FMI 2.0 and 3.0 for co-simulation",
-        ),
-        (
-            '<fmiModelDescription fmiVersion="1.0"/>',
-            "an FMU of FMI 1.0; supported are FMI 2.0 and 3.0 for co-simulation",
-        ),
-        (
-            '<fmiModelDescription fmiVersion="4.0"><CoSimulation/></fmiModelDescription>',
-            "an FMU of FMI 4.0; supported are FMI 2.0 and 3.0 for co-simulation",
-        ),
+        ("<fmiModelDescription", ("modelDescription.xml", "well-formed", "line 1")),
+        ('<html fmiVersion="2.0"/>', ("modelDescription.xml", "FMI 2.0", "3.0")),
+        ('<fmiModelDescription fmiVersion="1.0"/>', ("FMI 1.0", "2.0", "3.0")),
+        ('<fmiModelDescription fmiVersion="4.0"><CoSimulation/></fmiModelDescription>', ("FMI 4.0", "2.0")),
         (
             '<fmiModelDescription fmiVersion="2.0"><ModelExchange/></fmiModelDescription>',
-            "an FMU for model exchange only; supported are FMI 2.0 and 3.0 for co-simulation",
+            ("model exchange", "co-simulation"),
         ),
-        (
-            model_description("a").replace('guid="a"', ""),
-            "the model description is not valid FMI 2.0: ERROR (line 2, column 0): Element "
-            "'fmiModelDescription': The attribute 'guid' is required but missing"
-            "; 'validate: false' for the instance (--set INSTANCE.validate=false) makes it a warning",
-        ),
-        (
-            model_description("a", outputs=["x", "x"]),
-            'the model description is not valid FMI 2.0: The variable name "x" (line 7) is not unique; '
-            "'validate: false' for the instance (--set INSTANCE.validate=false) makes it a warning",
-        ),
-        (
-            model_description("a", outputs=["x"]).replace('index="1"', 'index="7"'),
-            "the model description cannot be used: index of Unknown names variable number '7', "
-            "but there are 1",
-        ),
-        (
-            model_description("a", outputs=["x"]).replace('index="1"', 'index="0"'),
-            "the model description cannot be used: index of Unknown names variable number '0', "
-            "but there are 1",
-        ),
+        (model_description("a").replace('guid="a"', ""), ("line 2", "'guid'", "INSTANCE.validate=false")),
+        (model_description("a", outputs=["x", "x"]), ('"x"', "line 7", "INSTANCE.validate=false")),
+        (ONE_OUTPUT.replace('index="1"', 'index="7"'), ("Unknown", "'7'", "1")),
+        (ONE_OUTPUT.replace('index="1"', 'index="0"'), ("Unknown", "'0'", "1")),
         (
             model_description("a", ["u"], [out("x", "u")]).replace('dependencies="1"', 'dependencies="1 9"'),
-            "the model description cannot be used: dependencies of Unknown names variable number '9', "
-            "but there are 2",
+            ("dependencies", "Unknown", "'9'", "2"),
         ),
-        (
-            model_description("a", outputs=["x"]).replace(' valueReference="1"', ""),
-            "the model description cannot be used: it is not valid FMI 2.0: ERROR (line 6, column 0): "
-            "Element 'ScalarVariable': The attribute 'valueReference' is required but missing",
-        ),
-        (
-            model_description("a").replace("UTF-8", "UTF-7"),
-            "modelDescription.xml has an encoding that cannot be read (multi-byte encodings are not "
-            "supported); FMI asks for UTF-8",
-        ),
-        (
-            model_description("a").replace("UTF-8", "KLINGON"),
-            "modelDescription.xml has an encoding that cannot be read (unknown encoding: KLINGON); FMI asks "
-            "for UTF-8",
-        ),
+        (ONE_OUTPUT.replace(' valueReference="1"', ""), ("line 6", "'ScalarVariable'", "'valueReference'")),
+        (model_description("a").replace("UTF-8", "UTF-7"), ("modelDescription.xml", "encoding", "UTF-8")),
+        (model_description("a").replace("UTF-8", "KLINGON"), ("modelDescription.xml", "KLINGON", "UTF-8")),
     ],
 )
 def test_a_model_description_that_cannot_be_used_is_said(
-    xml: str, expected: str, tmp_path: Path, cache: Path
+    xml: str, names: tuple[str, ...], tmp_path: Path, cache: Path
 ) -> None:
     path = make_fmu(tmp_path / "a.fmu", xml=xml)
-    assert problem(path) == f"{path}: {expected}"
+    said = problem(path)
+    assert mentions(said, path, *names)
+    assert "more)" not in said  # of the one violation
 
 
 def test_a_missing_binary_is_said_with_those_there_are(tmp_path: Path, cache: Path) -> None:

@@ -88,12 +88,6 @@ def test_fmus_run_with_any_libpython_that_the_environment_names(host, archive, u
         assert host_outputs(done, folder) == pytest.approx(expected_outputs(folder), rel=1e-12)
 
 
-def test_this_machine_has_a_libpython_to_test_with():
-    if not python_libraries():
-        pytest.skip("no libpython of 3.10 to 3.13 found; YAWBENCH_TEST_LIBPYTHONS may list some")
-    assert all(os.path.exists(file) for file in python_libraries().values())
-
-
 @pytest.mark.parametrize(
     ("file", "message"),
     [

@@ -39,6 +39,12 @@ class Drive:
         return rows
 
 
+some_units = pytest.mark.sampled(8)
+"""The build compares saved and restored states and resets of every native unit with Python's, and
+tests/components/test_conformance.py those with themselves."""
+
+
+@some_units
 @pytest.mark.parametrize("name", list(find_components()))
 def test_steps_undone_and_repeated_give_the_same_bits(load, name):
     drive, other = Drive(load(name)), Drive(load(name))
@@ -60,6 +66,7 @@ def test_steps_undone_and_repeated_give_the_same_bits(load, name):
     other.unit.free()
 
 
+@some_units
 @pytest.mark.parametrize("name", list(find_components()))
 def test_a_reset_unit_is_as_new(load, name):
     drive = Drive(load(name))

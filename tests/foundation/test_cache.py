@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
+from tests.command_line import status_of
 from tests.fmus.fake_fmus import make_fmu
 from tests.refusals import each_mentions, mentions, refused
-from yawbench.cli import main
 from yawbench.fmus.archive import open_fmu
 from yawbench.foundation.cache import STORES, cache_folder, keep, recall
 from yawbench.foundation.safe_files import write_whole
@@ -30,9 +30,7 @@ def full(cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def told(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[str, str]:
-    with pytest.raises(SystemExit) as ended:
-        main(["cache", *arguments])
-    assert not ended.value.code
+    assert status_of("cache", *arguments) == 0
     return capsys.readouterr()
 
 
@@ -136,9 +134,7 @@ def test_nothing_is_deleted_while_another_command_uses_the_cache(full, tmp_path,
         assert user.stdout is not None
         assert user.stdout.readline() == "opened\n"
         before = sorted(full.rglob("*"))
-        with pytest.raises(SystemExit) as ended:
-            main(["cache", "clear"])
-        assert ended.value.code == 1
+        assert status_of("cache", "clear") == 1
         assert mentions(capsys.readouterr().err, "cache", "command")
         assert sorted(full.rglob("*")) == before
         told(capsys, "show")

@@ -10,10 +10,10 @@ import pytest
 
 from tests.cars import make_plan
 from tests.changed import changed
+from tests.command_line import status_of
 from tests.conftest import put_fmus
 from tests.fmus.fake_fmus import Var, make_fmu
 from tests.refusals import mentions
-from yawbench.cli import main
 from yawbench.foundation.errors import ScenarioError, YawbenchError
 from yawbench.interop.can_log import write_log
 from yawbench.interop.can_signals import read_dbc, sensor_parameters
@@ -116,9 +116,7 @@ def test_a_log_of_a_run_is_a_recording_of_its_messages(dbc, run, tmp_path, capsy
         "sensor.wheel_speed_fl=Wheels.FrontLeft",
     ]
     options = ["--dbc", str(dbc), "--out", str(log), "--wheel-radius", str(RADIUS)]
-    with pytest.raises(SystemExit) as ended:
-        main(["export-can", str(run.folder), *pairs, *options])
-    assert not ended.value.code, capsys.readouterr().err
+    assert status_of("export-can", run.folder, *pairs, *options) == 0, capsys.readouterr().err
     file = ColumnFile(log)
     for pair, cycle, unit in zip(pairs, (4, 4, 8), ("deg/s", "g", "km/h"), strict=True):
         column, _, signal = pair.partition("=")
@@ -227,7 +225,5 @@ def test_the_command_lists_signals_and_prints_parameters_of_a_sensor(dbc, capsys
         ((), ("Inertial.YawRate", "deg/s", "0.005", "10")),
         (("yaw_rate=Inertial.YawRate", "--bit-rate", "500000"), ("yaw_rate_latency:", "0.00027")),
     ):
-        with pytest.raises(SystemExit) as ended:
-            main(["dbc", str(dbc), *arguments])
-        assert not ended.value.code
+        assert status_of("dbc", dbc, *arguments) == 0
         assert mentions(capsys.readouterr().out, *names)

@@ -13,8 +13,8 @@ from fmpy.validation import validate_fmu
 
 from tests.cars import make_plan
 from tests.changed import changed
+from tests.command_line import status_of
 from tests.refusals import mentions
-from yawbench.cli import main
 from yawbench.interop.second_opinion import Request, run_own
 from yawbench.interop.ssp_write import write_ssp
 from yawbench.orchestrator.results.reader import load_results
@@ -40,14 +40,8 @@ def both(tmp_path_factory):
     folder = tmp_path_factory.mktemp("one")
     put_fmus(folder, components=UNITS)
     file, settings = folder / "car.fmu", [f"--set={one}" for one in ONE_STEP]
-    with pytest.raises(SystemExit) as ended:
-        main(
-            [
-                *("export-fmu", str(SCENARIO), "--fmus", str(folder), "--set", "stop_time=2.5"),
-                *(*settings, "--out", str(file)),
-            ]
-        )
-    assert not ended.value.code
+    settings += ["--set", "stop_time=2.5"]
+    assert status_of("export-fmu", SCENARIO, "--fmus", folder, *settings, "--out", file) == 0
     scenario = load_scenario(SCENARIO, changes=changed(settings=ONE_STEP, stop_time=2.5))
     plan = make_plan(scenario, fmus=folder)
     write_ssp(plan, folder / "car.ssp")
@@ -92,10 +86,9 @@ def test_it_runs_here_although_it_logs_an_error_and_returns_ok(both, tmp_path, c
     units = {"car": {"fmu": str(file)}}
     data = {"stop_time": 2.5, "step_size": 0.001, "units": units, "record": [f"car.{n}" for n in names]}
     scenario.write_text(json.dumps(data), encoding="utf-8")
-    with pytest.raises(SystemExit) as ended:
-        main(["run", str(scenario), "--out", str(tmp_path / "out")])
+    status = status_of("run", scenario, "--out", tmp_path / "out")
     said = capsys.readouterr().err
-    assert not ended.value.code, said
+    assert status == 0, said
     assert mentions(said, "warning", "car at t = 0 s", "Error")
     results = load_results(tmp_path / "out")
     assert largest(np.array([results[f"car.{n}"] for n in names]).T, ours)[0] < SAME
@@ -122,8 +115,6 @@ def test_what_a_container_lacks_is_refused(fmus, tmp_path, capsys, change, names
     data["inputs"] = {**data.get("inputs", {}), **change.get("inputs", {})}
     path = tmp_path / "s.yaml"
     path.write_text(json.dumps(data, default=str), encoding="utf-8")
-    with pytest.raises(SystemExit) as ended:
-        main(["export-fmu", str(path), "--fmus", str(fmus), "--out", str(tmp_path / "s.fmu")])
-    assert ended.value.code == 2
+    assert status_of("export-fmu", path, "--fmus", fmus, "--out", tmp_path / "s.fmu") == 2
     assert mentions(capsys.readouterr().err, "s.fmu", *names)
     assert not (tmp_path / "s.fmu").exists()

@@ -13,10 +13,10 @@ import pytest
 
 from tests.cars import make_plan
 from tests.changed import changed
+from tests.command_line import status_of
 from tests.evidence import measured
 from tests.interop import fmpy_exchanging
 from tests.refusals import mentions, refused
-from yawbench.cli import main
 from yawbench.foundation.errors import WiringError
 from yawbench.interop import second_opinion as module
 from yawbench.interop.command import show
@@ -181,9 +181,7 @@ def test_the_command_prints_every_signal_and_the_times(fmus, capsys, monkeypatch
     monkeypatch.setattr(module, "_run", run)
     arguments = [str(SCENARIOS / "fuzzy_feedback/single_sine.yaml"), "--fmus", str(fmus)]
     options = ["--set", "stop_time=0.1", "--master", "libcosim", "--no-one-core"]
-    with pytest.raises(SystemExit) as exit_:
-        main(["second-opinion", *arguments, *options])
-    assert not exit_.value.code
+    assert status_of("second-opinion", *arguments, *options) == 0
     said = capsys.readouterr().out
     assert "plant.yaw_rate" in said
     assert mentions(said, "per", "communication", "step")
@@ -194,14 +192,10 @@ def test_a_second_opinion_without_a_comparison_is_no_agreement(master, fmus, cap
     monkeypatch.setattr(module, "installed", lambda master: False)
     scenario = SCENARIOS / "fuzzy_feedback/single_sine.yaml"
     options = ["--set", "stop_time=0.1", "--master", master, "--no-one-core"]
-    with pytest.raises(SystemExit) as exit_:
-        main(["second-opinion", str(scenario), "--fmus", str(fmus), *options])
-    assert exit_.value.code == 1
+    assert status_of("second-opinion", scenario, "--fmus", fmus, *options) == 1
     assert "nothing was compared" in capsys.readouterr().err
 
 
 def test_an_unknown_master_is_refused(capsys):
-    with pytest.raises(SystemExit) as exit_:
-        main(["second-opinion", "any.yaml", "--master", "libcosmi"])
-    assert exit_.value.code == 2
+    assert status_of("second-opinion", "any.yaml", "--master", "libcosmi") == 2
     assert mentions(capsys.readouterr().err.strip(), "--master libcosmi", "'libcosim'")

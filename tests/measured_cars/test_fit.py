@@ -1,17 +1,23 @@
-"""Fits of scenarios: the truth is found again, mistakes have a line, what cannot be identified is refused."""
+"""Fits of scenarios: the truth is found again, mistakes have a line, the page has what was found."""
 
 from __future__ import annotations
 
+import contextlib
+import io
 import json
 from pathlib import Path
 
 import numpy as np
 import pytest
+from lxml import html
 
 import yawbench as yb
+from tests.command_line import status_of
 from tests.commands.test_output import ALWAYS, documented
-from tests.reports.made_up import unpacked
-from yawbench.cli import main
+from tests.reports.browser import DESK, PHONE, Browser
+from tests.reports.flaws import check_whole, looks
+from tests.reports.made_up import data_in, unpacked
+from yawbench.figures.display import shown
 from yawbench.foundation.errors import ScenarioError
 from yawbench.measured_cars.fit_file import load_fit
 from yawbench.orchestrator.scenario import yaml_lines
@@ -78,17 +84,22 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return place
 
 
-def run(*arguments: object) -> int:
-    """Return the exit status of the command line."""
-    with pytest.raises(SystemExit) as ended:
-        main([str(one) for one in arguments])
-    return int(ended.value.code or 0)
+@pytest.fixture(scope="module")
+def fitted(folder: Path) -> tuple[Path, dict]:
+    """What `yawbench fit --json` writes, and its answer."""
+    with contextlib.redirect_stdout(io.StringIO()) as said:
+        assert status_of("fit", folder / "fit.yaml", "--out", folder / "out", "--jobs", "1", "--json") == 0
+    return folder / "out", json.loads(said.getvalue())
 
 
-def test_a_car_is_found_again_and_the_single_track_stands_beside(folder, capsys):
-    assert run("fit", folder / "fit.yaml", "--out", folder / "out", "--jobs", "1", "--json") == 0
-    data = json.loads((folder / "out" / "fit.json").read_text())
-    answer = json.loads(capsys.readouterr().out)
+@pytest.fixture
+def page(fitted) -> Path:
+    return fitted[0] / "fit.html"
+
+
+def test_a_car_is_found_again_and_the_single_track_stands_beside(fitted):
+    out, answer = fitted
+    data = json.loads((out / "fit.json").read_text())
     assert set(answer) == ALWAYS | documented()["fit"]
     assert answer["fit"] == data
     own, single = data["models"].values()
@@ -104,13 +115,9 @@ def test_a_car_is_found_again_and_the_single_track_stands_beside(folder, capsys)
         assert own["scores"]["held_out"][name]["fit"] > 99.9
     assert data["verdict"].startswith("better than")
     assert "held-out" in answer["tables"][-1]["columns"][-1]["heading"]
-    assert not (folder / "out" / "sets").exists()
-    page = unpacked(folder / "out" / "fit.html")
-    for words in ("better than a single track", "Rms differences over |acceleration_y|", "over lateral"):
-        assert words in page.replace("Better", "better")
-    text = (folder / "out" / "vehicle.yaml").read_text()
-    assert "fitted to made up" in text
-    vehicle = yaml_lines.read(folder / "out" / "vehicle.yaml", what="vehicle file").data
+    assert not (out / "sets").exists()
+    assert "fitted to made up" in (out / "vehicle.yaml").read_text()
+    vehicle = yaml_lines.read(out / "vehicle.yaml", what="vehicle file").data
     assert vehicle["parameters"]["yaw_inertia"] == pytest.approx(1791.6, rel=1e-4)
 
 
@@ -128,12 +135,12 @@ def test_an_interrupted_fit_goes_on(folder, monkeypatch):
 
     monkeypatch.setattr(module, "execute", stops)
     command = ("fit", folder / "fit.yaml", "--out", folder / "again", "--jobs", "1")
-    assert run(*command) == 130
+    assert status_of(*command) == 130
     before = sum(made[:3])
     assert len(list((folder / "again" / "sets").iterdir())) == before
     made.clear()
     made.extend([0] * 4)  # no further interruption
-    assert run(*command) == 0
+    assert status_of(*command) == 0
     total = json.loads((folder / "again" / "fit.json").read_text())["models"]["7 DOF"]["sets"]
     assert sum(made) == total - before + 1  # one of the held-out window
 
@@ -179,7 +186,7 @@ def test_a_fit_of_one_parameter_that_ends_where_it_began_or_at_a_bound_has_a_res
     head = FIT.partition("free:")[0]
     file = folder / "one.yaml"
     file.write_text(f"{head}most_sets: {most_sets}\nfree:\n  {free}\n")
-    assert run("fit", file, "--out", tmp_path / "out", "--jobs", "1") == 0, capsys.readouterr().err
+    assert status_of("fit", file, "--out", tmp_path / "out", "--jobs", "1") == 0, capsys.readouterr().err
     data = json.loads((tmp_path / "out" / "fit.json").read_text())
     own, _ = data["models"].values()
     (parameter,) = own["parameters"].values()
@@ -208,3 +215,64 @@ def test_values_too_large_to_be_compared_are_refused(folder):
         load_fit(file)
     assert {one.code for one in caught.value.diagnostics} == {"fit-window"}
     assert "yaw_rate" in str(caught.value)
+
+
+# Its page
+
+
+VIEWER = "const viewer = document.querySelector('.yv').viewer;"
+
+
+def test_every_number_of_its_tables_is_that_of_the_file(page):
+    data = json.loads(page.with_name("fit.json").read_text(encoding="utf-8"))
+    tree = html.fromstring(unpacked(page))
+    scores, *tables = tree.cssselect("main table:not(.yv *)")
+    rows = [[cell.text_content().strip() for cell in row] for row in scores.cssselect("tbody tr")]
+    wanted = [(name, title) for name in ("yaw_rate", "acceleration_y") for title in data["models"]]
+    assert [tuple(row[:2]) for row in rows] == wanted
+    for (name, title), row in zip(wanted, rows, strict=True):
+        unit = {"yaw_rate": "rad/s", "acceleration_y": "m/s2"}[name]
+        for part, cells in (("training", row[2:5]), ("held_out", row[5:8])):
+            score = data["models"][title]["scores"][part][name]
+            texts = [shown(score["rms"], unit), shown(score["largest"], unit), f"{score['fit']:.1f} %"]
+            assert cells == texts
+    assert len(tables[0].cssselect("tbody tr")) == len(TRUTH)
+    said = tree.xpath("string(//p[@class='said'])")
+    assert tables[0].getnext().text_content().count("no intervals: 1 piece of 5 s, fewer than 5") == 1
+    assert "kg·m2" in tables[0].text_content()
+    assert [table.findtext("caption") for table in tables[2:]] == [  # its speed is the same all the time
+        "Rms differences over |acceleration_y|, held-out windows"
+    ]
+    assert said[:1].lower() + said[1:].rstrip(".") == data["verdict"]
+
+
+def test_decoded_samples_equal_the_measured_ones(chromium: Browser, folder, page):
+    fit = load_fit(folder / "fit.yaml")
+    chromium.open(page)
+    chromium.wait_for("document.querySelector('.yv-ready')")
+    windows = [each.window for each in (*fit.training, *fit.held_out)]
+    rng = np.random.default_rng(3)
+    for _ in range(20):
+        window = windows[int(rng.integers(len(windows)))]
+        name = ("yaw_rate", "acceleration_y")[int(rng.integers(2))]
+        row = int(rng.integers(1, window.times.size - 1))
+        value, spread = chromium.run(
+            VIEWER + "const column = (run) => run.column(`plant.${arguments[0]}`);"
+            "const all = viewer.runs.flatMap((run) => [...column(run)]);"
+            "return [viewer.runs[0].at(`plant.${arguments[0]}`, arguments[1]),"
+            " Math.max(...all) - Math.min(...all)];",
+            name,
+            float(window.times[row]),
+        )
+        assert abs(value - window.measured[name][row]) <= spread / 131068 * (1 + 1e-9)
+
+
+def test_its_views_are_histories_and_cross_plots_of_the_car_and_both_models(page):
+    data = data_in(page.read_text(encoding="utf-8"))
+    assert [view["x"] for view in data["views"]] == ["time", "plant.acceleration_y"]
+    assert data["runs"][0]["label"] == "made up" and len(data["runs"]) == 3
+
+
+@pytest.mark.parametrize(("width", "colours"), looks(PHONE, DESK, narrow=False))
+def test_the_page_has_no_flaws_and_stays_within_its_budget(chromium: Browser, page, width, colours):
+    check_whole(chromium, page, width, colours)

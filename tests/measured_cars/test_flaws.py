@@ -217,6 +217,7 @@ GAPS = {
 }
 
 
+@pytest.mark.sampled(3)  # each of both once, with every flaw
 @pytest.mark.parametrize("jitter", [None, *JITTERS])
 @pytest.mark.parametrize("gaps", GAPS.values(), ids=GAPS)
 def test_gaps_hide_no_flaw_and_make_none(gaps, jitter, tmp_path):

@@ -11,7 +11,6 @@ from tests.judged_studies import judge_all, judge_some, verdicts
 from tests.scenarios.recorded_numbers import assert_recorded
 
 STUDY = Path(__file__).parents[2] / "scenarios" / "fuzzy_feedback" / "study.yaml"
-DEGREE = 0.017453292519943295
 
 
 @pytest.fixture(scope="module")
@@ -27,37 +26,15 @@ def whole(study):
     return judge_all(STUDY, study["folder"], "--quick")
 
 
-def test_the_controlled_car_follows_the_limited_reference_and_comes_to_rest(metric):
-    assert metric("both", "rms") <= 0.10
-    assert metric("both", "sideslip") <= 3 * DEGREE
-    assert metric("both", "moment") <= 6700.0
-    assert metric("both", "sideslip_at_end") <= 0.1 * DEGREE
-    assert metric("both", "yaw_rate_at_end") <= 0.001
-
-
-def test_the_uncontrolled_car_is_lost(metric):
-    assert metric("off", "sideslip") > 20 * DEGREE
-
-
-@pytest.mark.parametrize("system", ["yaw_rate_alone", "sideslip_alone"])
-def test_each_system_alone_holds_the_car(metric, system):
-    assert metric(system, "sideslip") < 8 * DEGREE
-
-
-def test_the_printed_reference_asks_for_more_sideslip_than_the_road_allows_the_limited_one(metric):
-    assert metric("unlimited/fuzzy_feedback", "sideslip") > 5 * metric("both", "sideslip")
-
-
 LOST = [
     "With control the sideslip practically coincides with its reference.",
     "Weighting the two outputs improves lateral stability greatly over either system alone.",
 ]
 
 
-def test_all_holds_but_that_the_sideslip_follows_too(study, metric):
+def test_all_holds_but_that_the_sideslip_follows_too(study):
     assert [says for says, verdict in verdicts(study).items() if verdict != "holds"] == LOST
     assert len(verdicts(study)) == 10
-    assert metric("both", "sideslip_rms") > 0.10  # one moment, two references
 
 
 @pytest.mark.exhaustive

@@ -9,9 +9,9 @@ import pytest
 
 import yawbench as yb
 from docs.generate.papers import SEEDS, numbers_of
+from tests.command_line import status_of
 from tests.judged_studies import check_figures, judge_all, judge_some, verdicts
 from tests.scenarios.recorded_numbers import assert_recorded
-from yawbench.cli import main
 from yawbench.components.cars.published_cars import PaperA
 from yawbench.studies.claim_schema import si_number
 from yawbench.studies.load_experiment import load_experiment
@@ -37,31 +37,6 @@ def whole(study):
 
 
 @pytest.mark.exhaustive
-def test_with_one_steering_input_for_all_speeds_the_network_is_lost_at_40_mps(metric_of_all):
-    errors = [metric_of_all(f"one_input/{speed}mps/fnn", "error") for speed in (25, 40)]
-    assert errors[0] > 0.05
-    assert errors[1] > 3.0 > 10 * metric_of_all("one_input/40mps/fuzzy_sideslip", "error")
-
-
-def test_without_control_the_error_is_what_the_paper_says(metric):
-    assert metric("15mps/off", "error") > 1.0
-    assert metric("25mps/off", "error") > 2.0
-    assert metric("40mps/off", "error") > 2.0
-
-
-@pytest.mark.parametrize("speed", SPEEDS)
-def test_the_network_stays_within_five_per_cent_without_chatter(metric, speed):
-    assert metric(f"{speed}mps/fnn", "error") <= 0.05
-    assert metric(f"{speed}mps/fnn", "chatter") <= 15e3
-
-
-@pytest.mark.parametrize("speed", SPEEDS)
-def test_so_it_does_by_the_papers_complete_learning_rule(metric, speed):
-    assert metric(f"complete_rule/{speed}mps", "error") <= 0.05
-    assert metric(f"complete_rule/{speed}mps", "chatter") <= 15e3
-
-
-@pytest.mark.exhaustive
 def test_the_complete_rule_works_at_scales_of_620_to_900_and_not_far_beyond():
     rule = {"controller.set_learning_rate": 2}
 
@@ -75,39 +50,6 @@ def test_the_complete_rule_works_at_scales_of_620_to_900_and_not_far_beyond():
     slow, shaken = errors(500), errors(1100)
     assert slow[0] > 0.05 >= max(slow[1:])
     assert shaken[2] > 0.05 >= max(shaken[:2])
-
-
-@pytest.mark.parametrize("speed", SPEEDS)
-def test_control_of_the_sideslip_takes_the_car_off_its_yaw_rate_and_path(metric, speed):
-    run, off = f"{speed}mps/fnn", f"{speed}mps/off"
-    assert metric(run, "yaw_rate") < 0.9 * metric(run, "yaw_rate_ref")
-    assert metric(run, "path") > metric(off, "path")
-
-
-@pytest.mark.parametrize("speed", SPEEDS)
-def test_conventional_fuzzy_control_lies_between_the_two(metric, speed):
-    errors = [metric(f"{speed}mps/{name}", "error") for name in ("fnn", "fuzzy_sideslip", "off")]
-    assert errors == sorted(errors)
-
-
-def test_frozen_weights_bring_twice_the_error_at_15_mps(metric):
-    frozen = yb.load(STUDY.with_name("15mps.yaml")).set({"controller.learning": False}).run()
-    assert metric("15mps/fnn", "error") <= 0.5 * frozen.metric("relative_peak_error(sideslip)")
-
-
-@pytest.mark.exhaustive
-def test_learning_halves_the_error_of_the_first_period_at_15_mps(metric_of_all):
-    learning, frozen = (
-        metric_of_all(f"three_periods/15mps/learning_{x}", "period_1") for x in ("true", "false")
-    )
-    assert learning <= 0.5 * frozen
-
-
-@pytest.mark.exhaustive
-@pytest.mark.parametrize("speed", [15, 25])
-def test_learning_goes_on_from_period_to_period(metric_of_all, speed):
-    run = f"three_periods/{speed}mps/learning_true"
-    assert metric_of_all(run, "period_3") < metric_of_all(run, "period_1")
 
 
 LOST = {
@@ -155,12 +97,6 @@ def test_danger_of_rolling_over_is_judged_by_the_acceleration_at_which_wheels_li
 
 
 @pytest.mark.exhaustive
-def test_unknown_at_15_mps_the_lighter_car_is_the_hardest(whole, metric_of_all):
-    errors = {run: metric_of_all(run, "error") for run in whole["runs"] if run.startswith("unknown/15mps/")}
-    assert max(errors, key=errors.get) == "unknown/15mps/lighter"
-
-
-@pytest.mark.exhaustive
 def test_the_laws_with_motors_that_lag_and_tuned_alike_are_in_the_order_of_the_docs(tmp_path):
     found = judge_all(STUDY.with_name("laws.yaml"), tmp_path)
     assert [check["holds"] for check in found["checks"]] == [False, False, True, True, True]
@@ -187,9 +123,7 @@ def test_the_recorded_objectives_of_other_seeds_are_what_a_search_finds(tuning, 
     seed = 2
     with SEEDS.open(encoding="utf-8", newline="") as lines:
         rows = [row for row in csv.DictReader(lines) if (row["tuning"], row["seed"]) == (tuning, str(seed))]
-    with pytest.raises(SystemExit) as ended:
-        main(["tune", str(STUDY.with_name(f"{tuning}.yaml")), "--seed", str(seed), "--out", str(tmp_path)])
-    assert not ended.value.code
+    assert status_of("tune", STUDY.with_name(f"{tuning}.yaml"), "--seed", seed, "--out", tmp_path) == 0
     with (tmp_path / "trials.csv").open(encoding="utf-8", newline="") as lines:
         trials = [row for row in csv.DictReader(lines) if row["objective"]]
     for row in rows:

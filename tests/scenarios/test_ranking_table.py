@@ -6,7 +6,7 @@ import csv
 
 import pytest
 
-from docs.generate import matrix_tables, ranking_pages
+from docs.generate import matrix_tables
 from tests.command_line import status_of
 from yawbench.ranking.ranking import load_ranking
 from yawbench.ranking.ranking_scores import RankingResult
@@ -17,11 +17,6 @@ RANKING = load_ranking(matrix_tables.FILE)
 @pytest.fixture(scope="module")
 def published() -> RankingResult:
     return matrix_tables.published()
-
-
-def test_the_pages_follow_from_what_is_published():
-    for page, text in ranking_pages.pages_with_tables().items():
-        assert text == page.read_text(encoding="utf-8")
 
 
 def test_the_published_cells_are_in_the_order_of_the_ranking(published):

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.command_line import status_of
 from tests.fmu_copies import put_fmus
-from yawbench.cli import main
 from yawbench.fmus.build import build_component
 from yawbench.foundation import plugins
 
@@ -47,13 +47,9 @@ def test_the_controller_of_the_readme_runs_and_follows_the_yaw_rate(tmp_path, ca
     file.write_text(code.replace("from ..fmi", "from yawbench.components.fmi"), encoding="utf-8")
     put_fmus(tmp_path, components=UNITS)
     build_component(file, tmp_path, role="controllers")
-    with pytest.raises(SystemExit) as exit_:
-        main([
-            "compare", str(ROOT / "scenarios/fnn_sideslip/25mps.yaml"),
-            "--swap", "controller=controller_off,controller_yaw_rate",
-            "--fmus", str(tmp_path), "--out", str(tmp_path / "out"),
-        ])  # fmt: skip
-    assert not exit_.value.code
+    given = ("--swap", "controller=controller_off,controller_yaw_rate", "--fmus", tmp_path)
+    scenario = ROOT / "scenarios/fnn_sideslip/25mps.yaml"
+    assert status_of("compare", scenario, *given, "--out", tmp_path / "out") == 0
     runs = {row["run"]: row for row in csv.DictReader((tmp_path / "out" / "table.csv").open())}
     errors = [float(runs[f"controller_{n}"]["rms_error(yaw_rate) [rad/s]"]) for n in ("yaw_rate", "off")]
     assert errors[0] < 0.5 * errors[1]

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 import yawbench as yb
+from tests.command_line import status_of
 from tests.markdown import table_in
 from tests.refusals import sentence_has
-from yawbench.cli import main
 from yawbench.studies.load_experiment import load_experiment
 
 from .open_loop import MANOEUVRES, SPEED, missed, row
@@ -84,9 +84,7 @@ def test_where_all_is_told_exactly_and_at_once_a_run_is_that_of_the_paper_to_the
     ],
 )
 def test_the_documentation_has_what_the_studies_measure(name, rows, page, tmp_path):
-    with pytest.raises(SystemExit) as exit_:
-        main(["study", str(ROOT / f"scenarios/real_signals/{name}.yaml"), "--out", str(tmp_path)])
-    assert not exit_.value.code
+    assert status_of("study", ROOT / f"scenarios/real_signals/{name}.yaml", "--out", tmp_path) == 0
     study = json.loads((tmp_path / "experiment.json").read_text("utf-8"))
     assert {check["verdict"] for check in study["checks"]} <= {"holds"}
     written = (ROOT / "docs" / f"{page}.md").read_text("utf-8")
@@ -171,9 +169,7 @@ def test_the_sentence_on_bounds_has_how_far_they_lie_above_what_is_measured(page
 
 @pytest.mark.exhaustive
 def test_the_page_on_real_signals_has_no_row_that_the_study_does_not_measure(tmp_path):
-    with pytest.raises(SystemExit) as exit_:
-        main(["study", str(ROOT / "scenarios/real_signals/degradation.yaml"), "--out", str(tmp_path)])
-    assert not exit_.value.code
+    assert status_of("study", ROOT / "scenarios/real_signals/degradation.yaml", "--out", tmp_path) == 0
     study = json.loads((tmp_path / "experiment.json").read_text("utf-8"))
     measured = step_by_step(study)
     begin = tuple(" ".join(row.split(" | ")[:1]) for row in measured)

@@ -10,7 +10,7 @@ from ruamel.yaml import YAML
 
 import yawbench as yb
 from tests.checkout import ROOT
-from yawbench.cli import main
+from tests.command_line import status_of
 from yawbench.orchestrator.scenario.catalogue import SHIPPED
 from yawbench.studies.axes import level_at
 from yawbench.studies.load_experiment import load_experiment
@@ -80,8 +80,6 @@ def test_the_objective_of_an_entry_is_what_its_runs_come_to(law, tmp_path):
         if run["name"].endswith("/tuned"):
             run |= {"swap": {"controller": FOUND[law]["fmu"]}, "set": {**run.get("set", {}), **changes(law)}}
     yaml.dump(file, tmp_path / "again.yaml")
-    with pytest.raises(SystemExit) as end:
-        main(["study", str(tmp_path / "again.yaml"), "--out", str(tmp_path / "out"), "--jobs", "1"])
-    assert not end.value.code
+    assert status_of("study", tmp_path / "again.yaml", "--out", tmp_path / "out", "--jobs", "1") == 0
     (made,) = json.loads((tmp_path / "out/experiment.json").read_text())["derived"].values()
     assert made["value"] == pytest.approx(costs(law)[0], rel=1e-3)

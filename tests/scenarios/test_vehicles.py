@@ -13,9 +13,9 @@ from ruamel.yaml import YAML
 
 from tests.cars import load_scenario, make_plan
 from tests.changed import changed
+from tests.command_line import status_of
 from tests.components.magic import forces_and_moment
 from tests.fmu_copies import put_fmus
-from yawbench.cli import main
 from yawbench.commands.check import show
 from yawbench.components.tyre_models.pacejka_2002_set import MagicFormulaParameters, coefficients
 from yawbench.foundation.errors import WiringError, warnings_in
@@ -197,10 +197,8 @@ def test_a_file_that_is_no_car_says_what_it_lacks(fmus, tmp_path):
 
 
 def test_the_command_prints_tables_and_draws_one_figure(fmus, tmp_path, capsys):
-    with pytest.raises(SystemExit) as done:
-        given = ("--plant", "plant_two_dof", "--fmus", str(fmus), "--out", str(tmp_path / "car.png"))
-        main(["vehicle", "show", str(file("esp_saloon")), *given])
-    assert not done.value.code
+    given = ("--plant", "plant_two_dof", "--fmus", fmus, "--out", tmp_path / "car.png")
+    assert status_of("vehicle", "show", file("esp_saloon"), *given) == 0
     said = " ".join(capsys.readouterr().out.split())
     assert "load of a front wheel at rest 4.64 kN" in said
     assert "stopping distance from 100 km/h -" in said
@@ -228,10 +226,9 @@ def test_the_command_prints_tables_and_draws_one_figure(fmus, tmp_path, capsys):
 )
 def test_what_cannot_be_driven_is_answered_in_sentences(fmus, capsys, tmp_path, monkeypatch, arguments, says):
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(SystemExit) as done:
-        main(["vehicle", "show", *arguments, "--fmus", str(fmus), "--out", str(tmp_path / "x")])
+    status = status_of("vehicle", "show", *arguments, "--fmus", fmus, "--out", tmp_path / "x")
     said = capsys.readouterr().err
-    assert done.value.code == 2
+    assert status == 2
     assert says in said and "Traceback" not in said
 
 
@@ -244,13 +241,10 @@ def test_a_car_that_settles_in_no_turn_has_its_other_figures_and_a_note(fmus, tm
     car["tyres"] = str(file("mid_size").parent / given["tyres"]) if given.get("tyres") else None
     car = {key: value for key, value in car.items() if value is not None}
     (tmp_path / "car.yaml").write_text(json.dumps(car, default=str))
-    with pytest.raises(SystemExit) as done:
-        main([
-            "vehicle", "show", str(tmp_path / "car.yaml"), "--plant", "plant_seven_dof", "--fmus", str(fmus),
-            "--out", str(tmp_path / "car.svg"),
-        ])  # fmt: skip
+    given = ("--plant", "plant_seven_dof", "--fmus", fmus, "--out", tmp_path / "car.svg")
+    status = status_of("vehicle", "show", tmp_path / "car.yaml", *given)
     said = capsys.readouterr()
-    assert not done.value.code, said.err
+    assert status == 0, said.err
     assert "80 km/h the car settles in no turn" in said.out + said.err
     assert "load of a front wheel at rest" in said.out
     assert (tmp_path / "car.svg").is_file()

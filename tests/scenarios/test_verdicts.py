@@ -8,6 +8,7 @@ import shutil
 import pytest
 
 from docs.generate import papers
+from docs.generate.__main__ import PUBLISHED
 from docs.generate.papers import KINDS, OTHERS, STUDIES, Numbers, numbers_of, record, recorded, study_of
 from tests.checkout import ROOT
 from tests.evidence import RECORD
@@ -40,8 +41,13 @@ def test_every_recorded_number_and_verdict_is_what_all_runs_come_to(name, tmp_pa
     assert_recorded(name, found)
 
 
-def test_the_pages_on_papers_follow_from_the_record():
-    for page, text in papers.pages_with_numbers().items():
+@pytest.mark.parametrize(
+    "pages",
+    [papers.pages_with_numbers, *(one.pages_with_tables for one in PUBLISHED)],
+    ids=lambda f: f.__module__,
+)
+def test_the_pages_follow_from_what_is_recorded_and_published(pages):
+    for page, text in pages().items():
         assert text == page.read_text(encoding="utf-8"), f"python -m docs.generate writes {page.name} anew"
 
 

@@ -1,4 +1,4 @@
-"""Slope of the force that tyres report, against differences of the force itself."""
+"""What every tyre does: four wheels apart, nothing without load or friction, its slope as told."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from yawbench.components.tyres.magic_formula_62 import MagicFormula62
 from yawbench.components.tyres.magic_formula_1987 import MagicFormula1987
 
 from .stand import Stand
+from .test_conformance import mirrored
 
 TYRES = [
     pytest.param(Dugoff, {}, id="Dugoff"),
@@ -26,6 +27,8 @@ TYRES = [
     pytest.param(MagicFormula1987, {}, id="1987"),
     pytest.param(MagicFormula1987, {"peak_friction": "measured"}, id="1987, measured"),
 ]
+every = pytest.mark.parametrize("tyre, parameters", TYRES)
+symmetric = pytest.mark.parametrize("tyre, parameters", [t for t in TYRES if "asymmetric" not in t.id])
 ALPHAS = (-0.3, -0.02, 0.0, 0.004, 0.1, 3.0)
 KAPPAS = (-1.2, -0.9, -0.15, -0.03, -0.002, 0.001, 0.05, 0.3, 0.9)
 
@@ -36,7 +39,7 @@ def of(stand, alpha, kappa, load, mu):
     return y["tyre_force_x_fl"], y["slip_stiffness_fl"], y["tyre_slip_ratio_fl"]
 
 
-@pytest.mark.parametrize("tyre, parameters", TYRES)
+@every
 def test_the_stiffness_is_the_slope_of_the_longitudinal_force_over_slip(tyre, parameters):
     stand = Stand(tyre, **parameters)
     stand.start()
@@ -55,7 +58,7 @@ def test_the_stiffness_is_the_slope_of_the_longitudinal_force_over_slip(tyre, pa
     assert kinks < 3
 
 
-@pytest.mark.parametrize("tyre, parameters", TYRES)
+@every
 def test_at_rest_the_stiffness_is_that_of_pure_slip(tyre, parameters):
     stand = Stand(tyre, **parameters)
     stand.start()
@@ -65,19 +68,70 @@ def test_at_rest_the_stiffness_is_that_of_pure_slip(tyre, parameters):
     assert found > 2e4
 
 
-@pytest.mark.parametrize("tyre, parameters", TYRES)
-def test_the_slip_told_is_the_slip_given_and_a_lifted_wheel_has_no_stiffness(tyre, parameters):
-    stand = Stand(tyre, **parameters)
-    stand.start()
-    assert of(stand, 0.1, -0.07, 0.0, 1.0)[1:] == (0.0, -0.07)
+STATES = {
+    "fl": (0.02, -0.03, 4000.0, 1.0),
+    "fr": (-0.05, 0.02, 3000.0, 0.3),
+    "rl": (0.01, 0.0, 3500.0, 0.8),
+    "rr": (0.04, -0.1, 2500.0, 0.5),
+}
+"""Slip angle, slip ratio, load and friction of each wheel."""
 
 
-@pytest.mark.parametrize("tyre, parameters", [t.values for t in TYRES if "asymmetric" not in t.id])
-def test_left_and_right_slip_angles_give_the_same_stiffness_to_the_last_bit(tyre, parameters):
+def given(states):
+    names = ("slip_angle", "slip_ratio", "vertical_load", "friction")
+    return {f"{n}_{w}": x for w, state in states.items() for n, x in zip(names, state, strict=True)}
+
+
+@every
+def test_a_wheel_has_its_own_slips_load_and_friction_and_the_others_do_not_matter(tyre, parameters):
+    together = Stand(tyre, **parameters).start(**given(STATES))
+    for wheel, state in STATES.items():
+        alone = Stand(tyre, **parameters).start(**given({wheel: state}))
+        for name, value in alone.items():
+            assert value == (together[name] if name.endswith(wheel) else 0.0)
+        assert alone[f"tyre_force_y_{wheel}"] * state[0] < 0.0
+
+
+@every
+def test_without_load_or_friction_a_wheel_has_no_force_but_tells_its_slip(tyre, parameters):
+    for load, mu in ((0.0, 1.0), (-500.0, 1.0), (4000.0, 0.0), (4000.0, -1.0), (-500.0, -0.5)):
+        if load > 0.0 and (tyre, parameters) == (LinearTyre, {}):
+            continue  # knows no friction
+        y = Stand(tyre, **parameters).start(**given({"fl": (0.1, -0.07, load, mu)}))
+        assert y.pop("tyre_slip_ratio_fl") == -0.07
+        assert set(y.values()) == {0.0}
+
+
+@symmetric
+def test_without_slip_there_is_no_force_and_left_and_right_are_mirrors_to_the_last_bit(tyre, parameters):
     stand = Stand(tyre, **parameters)
-    stand.start()
-    for alpha, kappa in product((0.01, 0.2, 3.0), KAPPAS):
-        assert of(stand, alpha, kappa, 4000.0, 0.8) == of(stand, -alpha, kappa, 4000.0, 0.8)
+    still = stand.start(**given({"fl": (0.0, 0.0, 4000.0, 0.8)}))
+    assert (still["tyre_force_x_fl"], still["tyre_force_y_fl"]) == (0.0, 0.0)
+    for alpha, kappa in product((0.01, 0.2, 1.2, 3.0), KAPPAS):
+        left, right = (
+            stand.step(0.001, **given({"fl": (a, kappa, 4e3, 0.8), "fr": (a, kappa, 4e3, 0.8)}))
+            for a in (alpha, -alpha)
+        )
+        assert right == mirrored(left)
+
+
+@pytest.mark.parametrize(
+    ("tyre", "limits"),
+    [
+        (MagicFormula, {"maximum_load": 4000.0}),
+        (MagicFormula1987, {"maximum_load": 4000.0}),
+        (MagicFormula1987, {"maximum_load": 4000.0, "peak_friction": "measured"}),
+        (MagicFormula62, {"fzmax_front": 4000.0}),
+    ],
+)
+def test_above_the_largest_load_of_the_set_everything_is_proportional_to_load(tyre, limits):
+    stand = Stand(tyre, **limits)
+    at_limit = stand.start(**given({"fl": (0.06, -0.05, 4000.0, 1.0)}))
+    above = stand.step(0.001, vertical_load_fl=12000.0)
+    assert above.pop("tyre_slip_ratio_fl") == at_limit.pop("tyre_slip_ratio_fl")
+    for name, value in at_limit.items():
+        of_slopes = name.startswith("slip_stiffness")  # differences of forces
+        assert above[name] == pytest.approx(3.0 * value, rel=1e-10 if of_slopes else 1e-12)
 
 
 def test_dugoffs_stiffness_is_finite_wherever_its_force_is():
@@ -87,7 +141,7 @@ def test_dugoffs_stiffness_is_finite_wherever_its_force_is():
         assert np.all(np.isfinite(dugoff(alpha, kappa, **tyre)))
 
 
-@pytest.mark.parametrize("tyre, parameters", TYRES)
+@every
 @pytest.mark.parametrize("kappa", [1e-140, -1.3e-162, 5e-324])
 def test_slips_too_small_to_be_squared_give_the_stiffness_at_rest(tyre, parameters, kappa):
     stand = Stand(tyre, **parameters)
