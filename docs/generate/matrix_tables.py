@@ -138,15 +138,11 @@ def matrix(result: RankingResult) -> Table:
     conditions = result.ranking.conditions
     rows = []
     for score in result.scores:
-        cells = (sign_of(cell) + _spun(cell) for cell in score.cells.values())
+        cells = (sign_of(cell) + " spun" * (cell.state is RankedState.SPUN) for cell in score.cells.values())
         passed = str(score.count(RankedState.PASSED))
         rows.append([str(score.rank), score.spec.title, passed, interval_words(score), *cells])
     headings = [condition.heading.replace("*", r"\*") for condition in conditions.values()]
     return Table("", ["", "controller", "passed", "95 % interval", *headings], [*rows], numbers={0, 2})
-
-
-def _spun(cell: RankingCell) -> str:
-    return " spun" if cell.state is RankedState.SPUN else ""
 
 
 def numbers(result: RankingResult) -> Table:

@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from math import comb
 from typing import Any
 
 import numpy as np
@@ -298,7 +299,7 @@ def nuisance_sentence(nuisance: Nuisance) -> str:
     least, most = controllers[0], controllers[-1]
     own = [k for k, score in enumerate(nuisance.complete) if score.spec.fmu != IDLE]
     among = nuisance.apart.of(own)
-    pairs = len(own) * (len(own) - 1) // 2
+    pairs = comb(len(own), 2)
     if len(own) < 2:
         return f"In ordinary driving {least.spec.title} brakes for {share_text(least.braking())} of the time."
     return (

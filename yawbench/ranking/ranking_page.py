@@ -173,7 +173,7 @@ def ranking_page(ranked: WholeRanking, folder: Path, command: str, each: Each = 
     lost = next(
         (cell for _, cell in cells if cell.state in (RankedState.FAILED, RankedState.SPUN)), cells[0][1]
     )
-    table = table_of(ranked)
+    table, pareto = table_of(ranked), folder / FIGURES / "pareto.svg"
     view = RankingPage(
         title=ranking.spec.title,
         answer=answer(ranked),
@@ -187,7 +187,7 @@ def ranking_page(ranked: WholeRanking, folder: Path, command: str, each: Each = 
         rows=_rows(ranked, digits),
         first_cell=_id(lost),
         frame=embedded(None, "run"),
-        pareto=_image(folder / FIGURES / "pareto.svg", "Stability over intervention"),
+        pareto=image_of(pareto, "Stability over intervention") if pareto.is_file() else None,
         table=Table("", table.columns, table.rows),
         described=_conditions(ranked),
         entries=_entries(ranked),
@@ -266,10 +266,6 @@ def sentence_of_threats(ranking: LoadedRanking) -> str:
         f"By threats turned up until the car is lost (published levels) {counted(sharing, 'controller')} "
         f"{'is first' if sharing == 1 else 'share the first place'}. {told_apart(table)}"
     )
-
-
-def _image(file: Path, title: str) -> FigureImage | None:
-    return image_of(file, title) if file.is_file() else None
 
 
 def _rows(ranked: WholeRanking, digits: Digits) -> list[MatrixRow]:
