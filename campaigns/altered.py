@@ -33,7 +33,6 @@ import threading
 import time
 import urllib.request
 from collections import Counter
-from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -51,6 +50,7 @@ from yawbench.cli import main as yawbench
 from yawbench.foundation.errors import YawbenchError
 
 from . import mutate
+from .child import working_in
 from .kills import SWEEP
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -116,7 +116,7 @@ def base(place: Path) -> Folder:
     )  # fmt: skip
     car = "scenarios/vehicles/mid_size.yaml"
     (place / "truth.yaml").write_text(OF_FIT.format(vehicle=car, stop=4, file="steer.csv"))
-    with contextlib.chdir(place) if hasattr(contextlib, "chdir") else _in(place):
+    with working_in(place):
         assert call("run", "truth.yaml", *FMUS, "--out", "out/truth") == 0
         from yawbench.orchestrator.results.reader import load_results
 
@@ -156,16 +156,6 @@ def base(place: Path) -> Folder:
         "option": [place / WHOLE],
     }  # fmt: skip
     return folder
-
-
-@contextlib.contextmanager
-def _in(place: Path) -> Iterator[None]:
-    before = os.getcwd()
-    os.chdir(place)
-    try:
-        yield
-    finally:
-        os.chdir(before)
 
 
 # ---- alterations ----

@@ -9,7 +9,6 @@ from __future__ import annotations
 import argparse
 import ast
 import importlib.util
-import json
 import math
 import os
 import random
@@ -37,6 +36,7 @@ from yawbench.fmus.native.specialise import Program, specialise
 from yawbench.fmus.native.values import Refused
 
 from . import class_programs
+from .child import told_by
 from .grammar import BEFORE
 from .random_programs import CALLED, COMPONENT, FUNCTION, OBJECT, program
 
@@ -245,38 +245,20 @@ def _in_a_process(every: Sequence[Tried], optimization: str) -> tuple[dict[int, 
 
     The others are the number of the program that was tried last, -1 for the compiler, and how it ended.
     """
-    reading, writing = os.pipe()
-    child = os.fork()
-    if child == 0:
-        try:
-            os.close(reading)
-            warnings.simplefilter("ignore")  # of literals in random programs
 
-            def tell(*news: Any) -> None:
-                signal.setitimer(signal.ITIMER_PROF, SECONDS)
-                os.write(writing, json.dumps(news).encode() + b"\n")
+    def act(tell: Callable[..., None]) -> None:
+        warnings.simplefilter("ignore")  # of literals in random programs
 
-            with tempfile.TemporaryDirectory() as folder:
-                _come_to(every, optimization, Path(folder), tell)
-        except BaseException as error:
-            os.write(writing, json.dumps([f"{type(error).__name__}: {error}"]).encode() + b"\n")
-        finally:
-            os._exit(0)
-    os.close(writing)
-    results, last, end = {}, -1, ""
-    with open(reading, encoding="utf-8") as answers:
-        for line in answers:
-            news = json.loads(line)
-            if isinstance(news[0], str):
-                end = news[0]
-            elif len(news) == 1:
-                last = news[0]
-            else:
-                results[news[0]] = news[1], news[2]
-    _, status = os.waitpid(child, 0)
-    if os.WIFSIGNALED(status):
-        end = f"it dies of {signal.Signals(os.WTERMSIG(status)).name}"
-    return results, last, end
+        def in_time(*news: Any) -> None:
+            signal.setitimer(signal.ITIMER_PROF, SECONDS)
+            tell(*news)
+
+        with tempfile.TemporaryDirectory() as folder:
+            _come_to(every, optimization, Path(folder), in_time)
+
+    news, end = told_by(act)
+    results = {one[0]: (one[1], one[2]) for one in news if len(one) > 1}
+    return results, next((one[0] for one in reversed(news) if len(one) == 1), -1), end
 
 
 def tried_all(every: Sequence[Tried], optimization: str = "-O0") -> list[tuple[str, str]]:
