@@ -8,18 +8,17 @@ import sys
 import time
 
 CAMPAIGNS = {
-    "mutations": "--files 3000 --commands 100 --ssp 600 --results 200",
     "altered": "--each 100",
     "result_folders": "--every 4",
     "wrong_calls": "",
     "hostile_fmus": "",
     "kills": "--each 10",
-    "full_disk": "--each 3",
+    "kills --full-disk": "--each 3",
     "translated": "--programs 600",
-    "classes": "--programs 600",
+    "translated --classes": "--programs 600",
     "random_calls": "--sequences 5",
 }
-"""Campaign -> its options, so that each takes minutes."""
+"""Campaign, with what it tries -> its options, so that each takes minutes."""
 UNSEEDED = ("result_folders", "wrong_calls", "hostile_fmus")
 """They try all cases, or every so manieth."""
 
@@ -33,10 +32,11 @@ def main() -> None:
         parser.error(f"{', '.join(sorted(unknown))} is none of {', '.join(CAMPAIGNS)}")
     failed = []
     for name in given.names or CAMPAIGNS:
-        options = [*CAMPAIGNS[name].split(), *([] if name in UNSEEDED else ["--seed", str(given.seed)])]
-        print(f"\n== python -m campaigns.{name} {' '.join(options)}", flush=True)
+        seeded = [] if name in UNSEEDED else ["--seed", str(given.seed)]
+        command = ["-m", *f"campaigns.{name} {CAMPAIGNS[name]}".split(), *seeded]
+        print(f"\n== python {' '.join(command)}", flush=True)
         began = time.monotonic()
-        if subprocess.run([sys.executable, "-m", f"campaigns.{name}", *options], check=False).returncode:
+        if subprocess.run([sys.executable, *command], check=False).returncode:
             failed.append(name)
         print(f"== {name}: {time.monotonic() - began:.0f} s", flush=True)
     sys.exit(f"did not hold: {', '.join(failed)}" if failed else 0)

@@ -1,14 +1,16 @@
-"""Values altered in files of users and in records read back: `python -m campaigns.altered`.
+"""Files of users and records altered at random, given to commands: `python -m campaigns.altered`.
 
     python -m campaigns.altered --each 400 --seed 1 --jobs 2
+    python -m campaigns.altered text archive --each 2000
     python -m campaigns.altered --only fit:17
 
-They are vehicle, fit and measurement files, and what runs, studies, sweeps and fits have written. Unlike
-`mutations`, which breaks texts, an alteration keeps a file well-formed and gives one or a few of its
-values another magnitude, sign, type, length or place, or one from another file: what passes the readers and
-is computed with. Records get new checksums, so that they are read. Each case is a command in a process of
-its own. What must hold: exit status 0, 1 or 2, a sentence unless it is 0, and neither a traceback, a warning
-of a library, a hang nor a huge memory.
+In vehicle, fit and measurement files, and in what runs, studies, sweeps and fits have written, an alteration
+keeps a file well-formed and gives one or a few of its values another magnitude, sign, type, length or place,
+or one from another file: what passes the readers and is computed with. The groups of `BROKEN` have what
+readers must refuse (`mutate`): bytes, tokens and structure of scenario, vehicle, study and sweep files, of an
+SSP archive and of recorded results, and values of options. Each case is a command in a process of its own.
+What must hold: exit status 0, 1 or 2, a sentence unless it is 0, and neither a traceback, a control
+character, a warning of a library, a hang nor a huge memory. Of what is broken, only results are written.
 """
 
 from __future__ import annotations
@@ -20,6 +22,7 @@ import io
 import json
 import os
 import random
+import re
 import resource
 import select
 import shutil
@@ -30,7 +33,6 @@ import threading
 import time
 import urllib.request
 from collections import Counter
-from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -43,56 +45,44 @@ from tests.commands.test_batch_commands import SCENARIO as HALF
 from tests.commands.test_batch_commands import STUDY
 from tests.measured_cars.test_fit import FIT, MEASURED
 from tests.measured_cars.test_fit import SCENARIO as OF_FIT
+from tests.trees import snapshot
 from yawbench.cli import main as yawbench
+from yawbench.foundation.errors import YawbenchError
 
+from . import mutate
+from .child import working_in
 from .kills import SWEEP
 
 ROOT = Path(__file__).resolve().parents[1]
 FMUS = ("--fmus", str(ROOT / "fmus"))
+WHOLE = "scenarios/fnn_sideslip/25mps.yaml"
+SHORT = ("--set", "stop_time=0.02", "--set", "step_size=0.002")
+TEMPORARY = "temporary"
 LIMIT = 60
 """Processor time that a command may take [s]; chosen: ten times what the longest takes."""
 MEMORY = 8_000_000_000
 """Address space that a command may take [bytes]; chosen: several times what one takes."""
-NOISE = ("Traceback", "yawbench itself", "Warning:", "Segmentation", "Unraisable")
-"""Words that no command may print."""
-FACTORS = (
-    -1.0,
-    0.0,
-    1e-300,
-    1e-12,
-    1e-6,
-    1e-3,
-    0.1,
-    0.5,
-    0.999999,
-    1.000001,
-    2.0,
-    10.0,
-    1e3,
-    1e6,
-    1e12,
-    1e300,
+NOISE = (
+    "Traceback",
+    "yawbench itself",
+    "is not understood",
+    "Warning:",
+    "Segmentation",
+    "Unraisable",
+    "\x1b",
 )
+"""Words that no command may print."""
+BROKEN = ("text", "archive", "recorded", "option")
+"""Groups of cases that are broken, not only altered."""
+FACTORS = (
+    -1.0, 0.0, 1e-300, 1e-12, 1e-6, 1e-3, 0.1, 0.5, 0.999999, 1.000001, 2.0, 10.0, 1e3, 1e6, 1e12, 1e300,
+)  # fmt: skip
 NUMBERS = (0, -1, 1, 2, 3, 7, 100, 2**31, -(2**63), 10**30, 0.5, -0.0, 5e-324, 1e-9, 1e9, 1.7e308)
 UNITS = ("s", "ms", "m/s", "km/h", "deg", "rad", "N", "kg", "%", "1", "deg/s", "m/s2", "h", "mm", "")
 TEXTS = (
-    "",
-    " ",
-    "x",
-    "0",
-    "-1",
-    "nan",
-    "inf",
-    "-inf",
-    "1e999",
-    "none",
-    "*",
-    "a.b",
-    "..",
-    "run.csv",
-    "\u00e9",
+    "", " ", "x", "0", "-1", "nan", "inf", "-inf", "1e999", "none", "*", "a.b", "..", "run.csv", "\u00e9",
     "plant",
-)
+)  # fmt: skip
 OTHERS: tuple[Any, ...] = (None, True, False, [], {}, [[]], [{}], {"": None}, [0, 1], {"a": 1}, "x")
 
 
@@ -117,16 +107,16 @@ def call(*arguments: object) -> int:
 def base(place: Path) -> Folder:
     """Write the files and make the results that cases are made from."""
     place.mkdir(parents=True)
-    shutil.copytree(ROOT / "scenarios" / "vehicles", place / "vehicles")
+    shutil.copytree(ROOT / "scenarios", place / "scenarios")
     times = np.arange(0.0, 4.005, 0.02)
     steer = 0.03 * np.sin(2.0 * np.pi * 0.7 * np.maximum(times - 0.3, 0.0))
     np.savetxt(
         place / "steer.csv", np.column_stack([times, steer]), delimiter=",", header="time,steer_angle [rad]",
         comments="",
     )  # fmt: skip
-    car = "vehicles/mid_size.yaml"
+    car = "scenarios/vehicles/mid_size.yaml"
     (place / "truth.yaml").write_text(OF_FIT.format(vehicle=car, stop=4, file="steer.csv"))
-    with contextlib.chdir(place) if hasattr(contextlib, "chdir") else _in(place):
+    with working_in(place):
         assert call("run", "truth.yaml", *FMUS, "--out", "out/truth") == 0
         from yawbench.orchestrator.results.reader import load_results
 
@@ -148,27 +138,24 @@ def base(place: Path) -> Folder:
         assert call("study", "study.yaml", *FMUS, "--jobs", "1", "--out", "out/study") in (0, 1)
         assert call("sweep", "sweep.yaml", *FMUS, "--jobs", "1", "--out", "out/sweep") == 0
         assert call("fit", "one.yaml", *FMUS, "--jobs", "1", "--out", "out/fit") == 0
+        assert call("export-ssp", WHOLE, *FMUS, "--out", "whole.ssp") == 0
+        for form in ("csv", "parquet"):
+            assert call("run", WHOLE, *FMUS, *SHORT, "--format", form, "--out", f"short/{form}") == 0
     folder = Folder(place)
     folder.cases = {
-        "vehicle": sorted((place / "vehicles").glob("*.yaml")),
+        "vehicle": sorted((place / "scenarios" / "vehicles").glob("*.yaml")),
         "fit": [place / name for name in ("fit.yaml", "fit.yaml", "one.yaml", "one.yaml", "scenario.yaml")],
         "measurement": [place / "measured.yaml", place / "run.csv"],
         "record": [
             path for name in ("run.json", "experiment.json", "fit.json", "runs.jsonl", "table.csv")
             for path in sorted((place / "out").rglob(name))
         ],
+        "text": sorted((place / "scenarios").rglob("*.yaml")),
+        "archive": [place / "whole.ssp"],
+        "recorded": sorted(path for path in (place / "short").rglob("*") if path.is_file()),
+        "option": [place / WHOLE],
     }  # fmt: skip
     return folder
-
-
-@contextlib.contextmanager
-def _in(place: Path) -> Iterator[None]:
-    before = os.getcwd()
-    os.chdir(place)
-    try:
-        yield
-    finally:
-        os.chdir(before)
 
 
 # ---- alterations ----
@@ -281,7 +268,48 @@ def _alter_record(content: dict[str, Any], others: list[Any], r: random.Random) 
     alter(part, others, r)
 
 
+def broken(group: str, file: Path, r: random.Random) -> bytes:
+    """Return the bytes of a file after mutations; options leave it as it is."""
+    raw = file.read_bytes()
+    if group == "option":
+        return raw
+    if group == "archive":
+        return mutate.mutated_archive(raw, r)
+    how = {".yaml": mutate.YAML, ".json": mutate.JSON, ".csv": mutate.CSV}.get(file.suffix, mutate.ANY)
+    return mutate.mutated(raw, how, r)
+
+
 # ---- cases ----
+
+
+def command_of_broken(group: str, file: Path, place: Path, r: random.Random) -> tuple[object, ...]:
+    """Return the command that a broken file, or value of an option, is given to."""
+    if group == "option":
+        texts = [text for text in mutate.NASTY if "\0" not in text and text.isprintable()]
+        targets = ("plant.mass", "driver.amplitude", "inputs.friction*", "vehicle.mass", "stop_time", "x", "")
+        value, target = r.choice(texts), r.choice(targets)
+        return r.choice((
+            ("check", file, *FMUS, f"--set={target}={value}"),
+            ("check", file, *FMUS, f"--swap={r.choice(('controller', 'plant', 'x'))}={value}"),
+            ("run", file, *FMUS, *SHORT, "--out", "made", f"--metric={value}"),
+            ("plot", file, *FMUS, "--out", "made", f"--panel={value}"),
+        ))  # fmt: skip
+    if group == "recorded":
+        run = file.parent
+        return r.choice((
+            ("list", "runs", "short"),
+            ("diff", run, "out/truth"),
+            ("plot", run, "--out", "made"),
+            ("evaluate", "turn-response", run, "--no-figures", "--out", "made"),
+        ))  # fmt: skip
+    if r.random() < 0.1:  # any command, also of other kinds of files
+        return (r.choice(("check", "study", "sweep", "tune", "plot", "animate", "export-ssp")), file)
+    if "vehicles" in file.parts:
+        return command_of("vehicle", file, place, r)
+    text = (ROOT / file).read_text(encoding="utf-8") if group == "text" else "units:"
+    if re.search(r"(?m)^(axes|runs|like):", text):
+        return r.choice((("load", file), ("load", file), ("study", file, "--no-run", *FMUS, "--out", "made")))
+    return r.choice((("check", file, *FMUS), ("run", file, *FMUS, *SHORT, "--out", "made")))
 
 
 def command_of(group: str, file: Path, place: Path, r: random.Random) -> tuple[object, ...]:
@@ -296,17 +324,11 @@ def command_of(group: str, file: Path, place: Path, r: random.Random) -> tuple[o
         return r.choice((
             ("run", "short.yaml", *FMUS, "--out", "made"),
             ("check", "short.yaml", *FMUS),
-            ("vehicle", "show", f"vehicles/{file.name}", *FMUS, "--plant", plant, "--out", "made/car.svg"),
+            ("vehicle", "show", file, *FMUS, "--plant", plant, "--out", "made/car.svg"),
         ))  # fmt: skip
     if group == "fit":
-        return (
-            "fit",
-            "one.yaml" if file.name == "scenario.yaml" else file.name,
-            *FMUS,
-            *jobs,
-            "--out",
-            "made",
-        )
+        fit = "one.yaml" if file.name == "scenario.yaml" else file.name
+        return ("fit", fit, *FMUS, *jobs, "--out", "made")
     if group == "measurement":
         return r.choice((
             ("measured", "show", "measured.yaml"),
@@ -361,17 +383,32 @@ def served(run: Path) -> None:
     bench.close()
 
 
+def loaded(file: Path) -> int:
+    """Return the exit status of reading an experiment file and its points."""
+    from yawbench.studies.load_experiment import load_experiment
+
+    try:
+        assert load_experiment(file).points
+    except YawbenchError as error:
+        print(error, file=sys.stderr)
+        return error.exit_status
+    return 0
+
+
 def case(group: str, number: int, seed: int, folder: Folder, box: Path) -> tuple[object, ...]:
     """Write a case into an empty folder; return its command."""
     r = random.Random(f"{seed}/{group}/{number}")
     shutil.copytree(folder.place, box)
     source = r.choice(folder.cases[group])
+    file = source.relative_to(folder.place)
+    if group in BROKEN:
+        (box / file).write_bytes(broken(group, source, r))
+        return command_of_broken(group, file, box, r)
     pool = [path for path in folder.cases[group] if path.suffix in (".yaml", ".json")] or [
         folder.place / "fit.yaml"
     ]
     other = YAML(typ="safe").load(r.choice(pool).read_bytes())
     others = [part[key] for part, key in places_in(other)]
-    file = source.relative_to(folder.place)
     (box / file).write_bytes(altered(source, others, r))
     return command_of(group, file, box, r)
 
@@ -384,7 +421,8 @@ def _child(arguments: tuple[object, ...], box: Path, said: Path) -> None:
     os.dup2(stream, 1)
     os.dup2(stream, 2)
     tempfile.tempdir = None
-    os.environ["TMPDIR"] = str(box)
+    os.environ["TMPDIR"] = str(box / TEMPORARY)
+    os.mkdir(TEMPORARY)
     resource.setrlimit(resource.RLIMIT_CPU, (LIMIT, LIMIT + 5))
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     sys.stdout = open(1, "w", closefd=False)  # noqa: SIM115
@@ -394,6 +432,8 @@ def _child(arguments: tuple[object, ...], box: Path, said: Path) -> None:
         status = 0
         if arguments[0] == "serve":
             served(Path(str(arguments[1])))
+        elif arguments[0] == "load":
+            status = loaded(Path(str(arguments[1])))
         else:
             yawbench([str(argument) for argument in arguments])
     except SystemExit as ended:
@@ -433,6 +473,11 @@ def outcome_of(arguments: tuple[object, ...], box: Path) -> tuple[str, str]:
     return ("taken", "failed in a sentence", "refused in a sentence")[code], text
 
 
+def _of_results(path: Path, box: Path) -> bool:
+    """Return whether a command may write a file: results, figures beside recorded ones, what is temporary."""
+    return path.relative_to(box).parts[0] in ("made", "results", "short", TEMPORARY) or path.suffix == ".ssp"
+
+
 def trial(
     group: str, numbers: list[int], seed: int, folder: Folder, jobs: int, keep: Path | None = None
 ) -> tuple[Counter[str], list[str]]:
@@ -443,7 +488,11 @@ def trial(
     def one(number: int) -> None:
         box = (keep or folder.place.parent) / f"{group}_{number}"
         arguments = case(group, number, seed, folder, box)
+        before = snapshot(box)
         outcome, text = outcome_of(arguments, box)
+        changed = {path for path, state in snapshot(box).items() if before.get(path) != state} - {str(box)}
+        if group in BROKEN and (written := [path for path in changed if not _of_results(Path(path), box)]):
+            outcome, text = "WROTE", f"{text}\n{written}"
         counts[outcome] += 1
         if outcome.isupper() or keep:
             command = " ".join(str(argument) for argument in arguments)
@@ -457,7 +506,7 @@ def trial(
     return counts, notes
 
 
-GROUPS: tuple[str, ...] = ("vehicle", "fit", "measurement", "record")
+GROUPS: tuple[str, ...] = ("vehicle", "fit", "measurement", "record", *BROKEN)
 
 
 def main() -> None:

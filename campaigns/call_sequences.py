@@ -185,8 +185,10 @@ class Writer:
             every = [*self.name_of, len(self.name_of), *REFERENCES]
             kind = chance.choice(("Real", "Integer", "Boolean", "String"))
             return kind, tuple(chance.choices(every, k=chance.randint(1, 4)))
-        kind = chance.choice(sorted({self.fmu.type[self.name_of[reference]] for reference in some}))
-        own = [reference for reference in some if self.fmu.type[self.name_of[reference]] == kind]
+        # FMI 2.0 has no function of its own for an Enumeration.
+        kinds = {each: self.fmu.type[self.name_of[each]].replace("Enumeration", "Integer") for each in some}
+        kind = chance.choice(sorted(set(kinds.values())))
+        own = [each for each in some if kinds[each] == kind]
         count = len(own) if chance.random() < 0.3 else chance.randint(1, len(own))
         return kind, tuple(chance.sample(own, min(count, MOST)))
 

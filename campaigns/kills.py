@@ -1,9 +1,12 @@
-"""Commands killed at random moments and called again: `python -m campaigns.kills --each 20`.
+"""Commands disturbed and called again: `python -m campaigns.kills --each 20`.
 
 A command is stopped by SIGKILL or SIGTERM at a moment drawn from the time that it takes undisturbed. What
 it leaves is then looked at (no half result may pass for a whole one), the command is called again, and
 what that leaves must be the same as if nothing had happened: the same numbers to the last byte, and no
 file of the killed one.
+
+With `--full-disk`, no file that it writes may exceed a size drawn between nothing and its largest file, as on
+a disk that fills up. It must fail with a sentence or have done all of its work; the rest is the same.
 """
 
 from __future__ import annotations
@@ -19,7 +22,7 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 
@@ -170,8 +173,44 @@ def _computed(file: Path) -> bytes:
     return repr([[row[k] for k in kept] for row in rows]).encode()
 
 
-def trial(command: str, each: int, seed: int, folder: Path, fmus: Path) -> tuple[Counter[str], list[str]]:
-    """Kill a command `each` times.
+Disturb = Callable[[Trial], tuple[str, str, list[str]]]
+"""Calls a command of a trial and disturbs it; returns the outcome, the circumstances, and what went wrong."""
+
+
+def killed(command: str, undisturbed: Trial, duration: float, r: random.Random) -> Disturb:
+    """Return what kills a command at a random moment."""
+    how, after = r.choice((signal.SIGKILL, signal.SIGTERM)), r.uniform(0.1, 1.0) * duration
+
+    def disturb(one: Trial) -> tuple[str, str, list[str]]:
+        alive, found = one.kill(command, after, how)
+        return how.name if alive else "had ended before", f"{how.name} after {after:.2f} s", found
+
+    return disturb
+
+
+def on_a_full_disk(command: str, undisturbed: Trial, duration: float, r: random.Random) -> Disturb:
+    """Return what calls a command without enough room."""
+    largest = max(path.stat().st_size for path in undisturbed.place.rglob("out/**/*") if path.is_file())
+    room = round(largest * r.random() ** 3)  # most files are small
+
+    def disturb(one: Trial) -> tuple[str, str, list[str]]:
+        status, said, _ = one.call(command, room)
+        found = [f"{word!r} on the terminal: {said.strip()[-300:]}" for word in NOISE if word in said]
+        if status == 0 and one.numbers() != undisturbed.numbers():
+            found.append("exit status 0 with other numbers than undisturbed")
+        if status not in (0, 1, 2):
+            found.append(f"exit status {status}")
+        if status and not said.strip():
+            found.append("no word on what went wrong")
+        return "failed" if status else "had room", f"{room} bytes", [*found, *one.litter()]
+
+    return disturb
+
+
+def trial(
+    command: str, each: int, seed: int, folder: Path, fmus: Path, disturbed: Callable[..., Disturb] = killed
+) -> tuple[Counter[str], list[str]]:
+    """Disturb a command `each` times.
 
     Returns:
         how many trials had which outcome ("held", or what went wrong); sentences on what went wrong.
@@ -188,60 +227,44 @@ def trial(command: str, each: int, seed: int, folder: Path, fmus: Path) -> tuple
         one = Trial(folder / f"{command} {number}", fmus)
         if command != "sweep" and r.random() < 0.5:  # with results of an earlier call, which a sweep keeps
             shutil.copytree(undisturbed.place / "out", one.place / "out")
-        how = r.choice((signal.SIGKILL, signal.SIGTERM))
-        after = r.uniform(0.1, 1.0) * duration
-        alive, found = one.kill(command, after, how)
+        outcome, circumstances, found = disturbed(command, undisturbed, duration, r)(one)
         found += one.halves(whole)
         status, said, _ = one.call(command)
-        found += [f"exit status {status}: {said.strip().splitlines()[-1:]}"] if status else []
-        found += ["a traceback"] if "Traceback" in said else []
+        found += [f"called again, exit status {status}: {said.strip().splitlines()[-1:]}"] if status else []
+        found += ["called again, a traceback"] if "Traceback" in said else []
         found += [*one.litter()]
         if one.numbers() != whole:
-            found.append("other numbers than undisturbed")
+            found.append("called again, other numbers than undisturbed")
         counts["held" if not found else "did not hold"] += 1
-        counts[how.name if alive else "had ended before"] += 1
-        notes += [f"{command} {number}, {how.name} after {after:.2f} s: {sentence}" for sentence in found]
+        counts[outcome] += 1
+        notes += [f"{command} {number}, {circumstances}: {sentence}" for sentence in found]
         shutil.rmtree(one.place.parent)
     return counts, notes
 
 
-def campaign(
-    title: str, trial: Callable[..., tuple[Counter[str], list[str]]], calls: str, outcomes: Mapping[str, str]
-) -> None:
-    """Try commands and print a row of a table for each; exit with 1 if something did not hold.
-
-    Args:
-        title: of the help.
-        trial: tries a command; returns its outcomes and sentences on what went wrong.
-        calls: heading of the number of trials.
-        outcomes: heading -> outcome.
-    """
-    parser = argparse.ArgumentParser(description=title)
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("commands", nargs="*", default=list(COMMANDS), help="default: all")
-    parser.add_argument("--each", type=int, default=20, help=f"{calls} of each command")
+    parser.add_argument("--each", type=int, default=20, help="trials of each command")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--full-disk", action="store_true")
     given = parser.parse_args()
-    failed = False
-    print(f"| command | {calls} | {' | '.join(outcomes)} |")
+    outcomes = ("failed", "had room") if given.full_disk else ("SIGKILL", "SIGTERM", "had ended before")
+    outcomes, failed = (*outcomes, "held"), False
+    print(f"| command | trials | {' | '.join(outcomes)} |")
     print(f"|---|---:|{'---:|' * len(outcomes)}", flush=True)
     with tempfile.TemporaryDirectory(prefix="trials-") as folder:
         fmus = Path(folder, "fmus")
         build_all(fmus, components=UNITS)
         for command in given.commands:
-            counts, notes = trial(command, given.each, given.seed, Path(folder), fmus)
-            numbers = (given.each, *(counts[outcome] for outcome in outcomes.values()))
+            disturbed = on_a_full_disk if given.full_disk else killed
+            counts, notes = trial(command, given.each, given.seed, Path(folder), fmus, disturbed)
+            numbers = (given.each, *(counts[outcome] for outcome in outcomes))
             print(f"| `{command}` | {' | '.join(map(str, numbers))} |", flush=True)
             print("".join(f"{note}\n" for note in notes), end="", file=sys.stderr, flush=True)
             failed = failed or bool(notes)
     sys.exit(failed)
 
 
-OUTCOMES = {
-    "by SIGKILL": "SIGKILL",
-    "by SIGTERM": "SIGTERM",
-    "had ended before": "had ended before",
-    "held": "held",
-}
-
 if __name__ == "__main__":
-    campaign(__doc__.partition("\n")[0], trial, "kills", OUTCOMES)
+    main()

@@ -13,12 +13,10 @@ that is watched; those behind one that dies are made in the next.
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import resource
 import signal
 import tempfile
-import traceback
 import zipfile
 from collections import Counter
 from collections.abc import Sequence
@@ -32,6 +30,7 @@ from yawbench.fmus.build import HERE as FMUS
 from yawbench.fmus.native.ir import ALONE
 
 from .call_sequences import Writer
+from .child import told_by
 from .fmi_calls import Call, Host
 
 SAME, LEFT = "the same", "the same, then left to Python"
@@ -79,43 +78,24 @@ def both_answer(hosts: Sequence[Host], calls: Sequence[Call], tell: Any) -> Outc
 
 def _in_a_process(unit: Path, every: Sequence[Sequence[Call]]) -> list[Outcome]:
     """Return what sequences come to, as far as one process makes them: at least the first."""
-    reading, writing = os.pipe()
-    child = os.fork()
-    if child == 0:
-        try:
-            os.close(reading)
-            resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
 
-            def tell(*news: Any) -> None:
-                os.write(writing, json.dumps(news).encode() + b"\n")
+    def act(tell: Any) -> None:
+        resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+        hosts = []
+        for way in WAYS:
+            os.environ[WANTED] = way
+            tell(0, way)
+            hosts.append(Host(unit / way))
+        for calls in every:
+            signal.setitimer(signal.ITIMER_PROF, SECONDS)
+            outcome = both_answer(hosts, calls, tell)
+            tell(outcome.how, outcome.made, outcome.why)
 
-            hosts = []
-            for way in WAYS:
-                os.environ[WANTED] = way
-                tell(0, way)
-                hosts.append(Host(unit / way))
-            for calls in every:
-                signal.setitimer(signal.ITIMER_PROF, SECONDS)
-                outcome = both_answer(hosts, calls, tell)
-                tell(outcome.how, outcome.made, outcome.why)
-        except BaseException:
-            traceback.print_exc()
-        finally:
-            os._exit(0)
-    os.close(writing)
-    outcomes, last = [], (0, "")
-    with open(reading, encoding="utf-8") as answers:
-        for line in answers:
-            news = json.loads(line)
-            if isinstance(news[0], str):
-                outcomes.append(Outcome(*news))
-            else:
-                last = news[0], news[1]
-    _, status = os.waitpid(child, 0)
+    news, end = told_by(act)
+    outcomes = [Outcome(*one) for one in news if isinstance(one[0], str)]
     if len(outcomes) < len(every):
-        number, way = last
-        by = signal.Signals(os.WTERMSIG(status)).name if os.WIFSIGNALED(status) else "itself"
-        outcomes.append(Outcome(SLOW if by == "SIGPROF" else DEAD, number, f"{way} ends by {by}"))
+        number, way = next((one for one in reversed(news) if not isinstance(one[0], str)), (0, ""))
+        outcomes.append(Outcome(SLOW if end == "SIGPROF" else DEAD, number, f"{way} ends by {end}"))
     return outcomes
 
 

@@ -40,6 +40,8 @@ from yawbench.foundation.safe_files import LOCK_FILE
 from yawbench.orchestrator.results.file_formats import FILES
 from yawbench.orchestrator.results.recorder import write_results
 
+from .child import working_in
+
 LIMIT = 60.0
 """Processor time that a command may take [s]; chosen: a hundred times what one takes."""
 
@@ -323,7 +325,7 @@ def trial(chosen: Iterable[Case], folder: Path) -> Tally:
     (folder / "study.yaml").write_text(STUDY)
     tally = Tally()
     turns = list(IN_TURN)
-    with _working_in(folder):
+    with working_in(folder):
         for case in chosen:
             theirs = folder / "theirs"
             shutil.copytree(folder / "template", theirs)
@@ -406,16 +408,6 @@ def _remove(folder: Path) -> None:
         else:
             path.unlink()
     folder.rmdir()
-
-
-@contextlib.contextmanager
-def _working_in(folder: Path) -> Iterator[None]:
-    before = Path.cwd()
-    os.chdir(folder)
-    try:
-        yield
-    finally:
-        os.chdir(before)
 
 
 @contextlib.contextmanager

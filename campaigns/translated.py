@@ -1,6 +1,7 @@
 """Random programs, translated to C and driven beside Python: the same bytes, or a refusal with its line.
 
 python -m campaigns.translated --programs 2000 --seed 1
+python -m campaigns.translated --classes --programs 3000 --seed 1    # laws made of classes
 """
 
 from __future__ import annotations
@@ -8,7 +9,6 @@ from __future__ import annotations
 import argparse
 import ast
 import importlib.util
-import json
 import math
 import os
 import random
@@ -20,7 +20,7 @@ import tempfile
 import warnings
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +35,8 @@ from yawbench.fmus.native.ir import ALONE
 from yawbench.fmus.native.specialise import Program, specialise
 from yawbench.fmus.native.values import Refused
 
+from . import class_programs
+from .child import told_by
 from .grammar import BEFORE
 from .random_programs import CALLED, COMPONENT, FUNCTION, OBJECT, program
 
@@ -48,26 +50,19 @@ KEPT = ("start", "advance", "output", "law", "__call__", "__init__", "Law")
 LITERAL = 'from typing import Literal\n\nMode = Literal["first", "second", "third"]\n'
 """Type of the text parameter of laws."""
 VALUES = (
-    0.0,
-    -0.0,
-    1.0,
-    -1.0,
-    0.5,
-    -0.5,
-    1.5,
-    2.5,
-    2.0,
-    3.0,
-    -7.0,
-    1e-300,
-    5e-324,
-    1e17,
-    2.0**53,
-    -1e300,
-    math.inf,
-    math.nan,
-)
+    0.0, -0.0, 1.0, -1.0, 0.5, -0.5, 1.5, 2.5, 2.0, 3.0, -7.0, 1e-300, 5e-324, 1e17, 2.0**53, -1e300,
+    math.inf, math.nan,
+)  # fmt: skip
 """Inputs that meet limits, among those that are drawn."""
+
+
+@dataclass(frozen=True)
+class Tried:
+    """A program, and the seed of what it is driven with."""
+
+    text: str
+    seed: int
+    kind: str = COMPONENT
 
 
 @dataclass
@@ -76,7 +71,7 @@ class Tally:
 
     counts: Counter[str] = field(default_factory=Counter)
     reasons: Counter[str] = field(default_factory=Counter)
-    bad: list[tuple[int, str]] = field(default_factory=list)
+    bad: list[tuple[Tried, str]] = field(default_factory=list)
 
 
 def _same(a: Any, b: Any) -> bool:
@@ -170,15 +165,6 @@ def drive(library: Path, component: type[Any], folder: Path, seed: int, starts: 
                 pair.call("get", outputs)
 
 
-@dataclass(frozen=True)
-class Tried:
-    """A program, and the seed of what it is driven with."""
-
-    text: str
-    seed: int
-    kind: str = COMPONENT
-
-
 class _Translating:
     """Translation of programs, all in one staged package."""
 
@@ -259,38 +245,20 @@ def _in_a_process(every: Sequence[Tried], optimization: str) -> tuple[dict[int, 
 
     The others are the number of the program that was tried last, -1 for the compiler, and how it ended.
     """
-    reading, writing = os.pipe()
-    child = os.fork()
-    if child == 0:
-        try:
-            os.close(reading)
-            warnings.simplefilter("ignore")  # of literals in random programs
 
-            def tell(*news: Any) -> None:
-                signal.setitimer(signal.ITIMER_PROF, SECONDS)
-                os.write(writing, json.dumps(news).encode() + b"\n")
+    def act(tell: Callable[..., None]) -> None:
+        warnings.simplefilter("ignore")  # of literals in random programs
 
-            with tempfile.TemporaryDirectory() as folder:
-                _come_to(every, optimization, Path(folder), tell)
-        except BaseException as error:
-            os.write(writing, json.dumps([f"{type(error).__name__}: {error}"]).encode() + b"\n")
-        finally:
-            os._exit(0)
-    os.close(writing)
-    results, last, end = {}, -1, ""
-    with open(reading, encoding="utf-8") as answers:
-        for line in answers:
-            news = json.loads(line)
-            if isinstance(news[0], str):
-                end = news[0]
-            elif len(news) == 1:
-                last = news[0]
-            else:
-                results[news[0]] = news[1], news[2]
-    _, status = os.waitpid(child, 0)
-    if os.WIFSIGNALED(status):
-        end = f"it dies of {signal.Signals(os.WTERMSIG(status)).name}"
-    return results, last, end
+        def in_time(*news: Any) -> None:
+            signal.setitimer(signal.ITIMER_PROF, SECONDS)
+            tell(*news)
+
+        with tempfile.TemporaryDirectory() as folder:
+            _come_to(every, optimization, Path(folder), in_time)
+
+    news, end = told_by(act)
+    results = {one[0]: (one[1], one[2]) for one in news if len(one) > 1}
+    return results, next((one[0] for one in reversed(news) if len(one) == 1), -1), end
 
 
 def tried_all(every: Sequence[Tried], optimization: str = "-O0") -> list[tuple[str, str]]:
@@ -325,19 +293,28 @@ def kind_of(seed: int) -> str:
     return (COMPONENT, COMPONENT, FUNCTION, COMPONENT, (CALLED, OBJECT)[seed // 5 % 2])[seed % 5]
 
 
-def trial(seeds: Sequence[int]) -> Tally:
+def program_of(seed: int) -> Tried:
+    """Return the program of a seed in the first grammar."""
+    return Tried(program(seed, kind_of(seed)), seed, kind_of(seed))
+
+
+def law_of_classes(seed: int) -> Tried:
+    """Return the law of a seed in the second grammar."""
+    return Tried(class_programs.program(seed), seed, OBJECT)
+
+
+def trial(seeds: Sequence[int], made: Callable[[int], Tried] = program_of) -> Tally:
     """Try programs, `TOGETHER` at a time, one time in four as optimized as units are."""
     tally = Tally()
     for first in range(0, len(seeds), TOGETHER):
-        some = seeds[first : first + TOGETHER]
+        some = [made(seed) for seed in seeds[first : first + TOGETHER]]
         optimization = "-O2" if first // TOGETHER % 4 == 3 else "-O0"
-        results = tried_all([Tried(program(x, kind_of(x)), x, kind_of(x)) for x in some], optimization)
-        for seed, (how, why) in zip(some, results, strict=True):
+        for one, (how, why) in zip(some, tried_all(some, optimization), strict=True):
             tally.counts[how] += 1
             if how == REFUSED:
                 tally.reasons[why] += 1
             elif how == WRONG:
-                tally.bad.append((seed, why))
+                tally.bad.append((one, why))
     return tally
 
 
@@ -347,14 +324,15 @@ def alike(one: str, other: str) -> bool:
     return one == other
 
 
-def shrunk(text: str, seed: int, kind: str, why: str) -> str:
-    """Return a program with fewer statements and expressions that is wrong in the same way."""
+def shrunk(one: Tried, why: str) -> tuple[str, str]:
+    """Return a program with fewer statements and expressions that is wrong in the same way, and how."""
+    text = one.text
     while True:
         queue = sorted({x for x in _shorter(text) if len(x) < len(text)}, key=len)
         found = None
         for first in range(0, len(queue), TOGETHER):
             some = queue[first : first + TOGETHER]
-            results = tried_all([Tried(x, seed, kind) for x in some])
+            results = tried_all([replace(one, text=x) for x in some])
             found = next(
                 (
                     x
@@ -366,7 +344,7 @@ def shrunk(text: str, seed: int, kind: str, why: str) -> str:
             if found:
                 break
         if not found:
-            return text
+            return text, tried(text, one.seed, one.kind)[1]
         text = found
 
 
@@ -409,23 +387,20 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--programs", type=int, default=1000)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--classes", action="store_true", help="laws made of classes")
     parser.add_argument("--shrink", action="store_true", help="show wrong programs with fewest statements")
     parser.add_argument("--until", type=int, default=10**9, help="wrong programs after which it ends")
     args = parser.parse_args()
     began, total = sum(os.times()[:4]), Tally()
     seeds = range(args.seed * 1_000_000, args.seed * 1_000_000 + args.programs)
     for first in range(0, len(seeds), 4 * TOGETHER):
-        some = trial(seeds[first : first + 4 * TOGETHER])
+        some = trial(seeds[first : first + 4 * TOGETHER], law_of_classes if args.classes else program_of)
         total.counts += some.counts
         total.reasons += some.reasons
         total.bad += some.bad
-        for seed, why in some.bad:
-            kind = kind_of(seed)
-            text = program(seed, kind)
-            if args.shrink:
-                text = shrunk(text, seed, kind, why)
-                why = tried(text, seed, kind)[1]
-            print(f"==== {seed}, {kind}\n{text}\n{why}\n", flush=True)
+        for one, why in some.bad:
+            text, why = shrunk(one, why) if args.shrink else (one.text, why)
+            print(f"==== {one.seed}, {one.kind}\n{text}\n{why}\n", flush=True)
         if len(total.bad) >= args.until:
             break
     print(dict(total.counts), f"in {sum(os.times()[:4]) - began:.0f} s of processor time")

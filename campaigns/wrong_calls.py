@@ -15,9 +15,9 @@ import argparse
 import contextlib
 import inspect
 import io
-import multiprocessing
 import os
 import resource
+import signal
 import sys
 import tempfile
 import traceback
@@ -26,13 +26,13 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache, cached_property
-from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
 import yawbench as yb
 from yawbench.foundation.messages import unprintable
 
+from .child import told_by, working_in
 from .wrong_values import TEXTS, WRONG, plant_links
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -84,15 +84,12 @@ def beside(call: Callable[[Any], object]) -> Callable[[Any], object]:
     """Return a call that is made in a folder of its own, so that it meets no file of another."""
 
     def made(value: Any) -> object:
-        home, folder = Path.cwd(), Path("beside").resolve()
+        folder = Path("beside").resolve()
         if not folder.is_dir():
             folder.mkdir()
             plant_links(folder)
-        os.chdir(folder)
-        try:
+        with working_in(folder):
             return call(value)
-        finally:
-            os.chdir(home)
 
     return made
 
@@ -567,7 +564,6 @@ class Tally:
 
     counts: Counter[str] = field(default_factory=Counter)
     notes: list[str] = field(default_factory=list)
-    tell: Callable[[str], None] = lambda text: None
 
     @property
     def bad(self) -> int:
@@ -581,61 +577,29 @@ def cases(only: str = "") -> list[tuple[Parameter, str]]:
     return [(one, label) for one in chosen for label in WRONG if label not in one.skip]
 
 
-def work(pipe: Connection, given: list[tuple[Parameter, str]], first: int, folder: Path) -> None:
-    """Make calls in this process, telling the parent before and after each."""
-    os.chdir(folder)
-    warnings.simplefilter("ignore")
-    sys.unraisablehook = lambda _: None
-    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
-    for number in range(first, len(given)):
-        pipe.send((number, None, ""))
-        pipe.send((number, *outcome_of(*given[number])))
-    pipe.send((len(given), None, ""))
-
-
-def trial(
-    given: list[tuple[Parameter, str]],
-    folder: Path,
-    *,
-    limit: float = LIMIT,
-    tell: Callable[[str], None] = lambda text: None,
-) -> Tally:
-    """Make calls in a folder, one process after the other where one hangs or dies.
-
-    Args:
-        given: the calls.
-        folder: an empty one.
-        limit: time that a call may take [s].
-        tell: what a call that did not hold is told to.
-    """
-    tally = Tally(tell=tell)
+def trial(given: list[tuple[Parameter, str]], folder: Path) -> Tally:
+    """Make calls in a folder, an empty one, in one process after the other where one hangs or dies."""
+    tally = Tally()
     plant_links(folder)
     BENCH.warm()
-    context = multiprocessing.get_context("fork")
     first = 0
     while first < len(given):
-        ours, theirs = context.Pipe(duplex=False)
-        process = context.Process(target=work, args=(theirs, given, first, folder))
-        process.start()
-        theirs.close()
-        outcome, said, current = "", "", first
-        try:
-            while current < len(given):
-                if not ours.poll(limit):
-                    outcome, said = "HANG", f"more than {limit:g} s"
-                    break
-                current, outcome, said = ours.recv()
-                if outcome is not None:
-                    note(tally, given[current], outcome, said)
-        except EOFError:
-            process.join()
-            outcome, said = "DIED", f"exit status {process.exitcode}"
-        finally:
-            process.kill()
-            process.join()
-        if current < len(given):
-            note(tally, given[current], outcome, said)
-        first = current + 1
+
+        def act(tell: Callable[..., None], first: int = first) -> None:
+            os.chdir(folder)
+            warnings.simplefilter("ignore")
+            sys.unraisablehook = lambda _: None
+            resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+            for case in given[first:]:
+                signal.setitimer(signal.ITIMER_REAL, LIMIT)
+                tell(*outcome_of(*case))
+
+        news, end = told_by(act)
+        if len(news) < len(given) - first:
+            news.append(("HANG", f"more than {LIMIT:g} s") if end == "SIGALRM" else ("DIED", end or "exits"))
+        for case, (outcome, said) in zip(given[first:], news, strict=False):
+            note(tally, case, outcome, said)
+        first += len(news)
     return tally
 
 
@@ -644,7 +608,6 @@ def note(tally: Tally, case: tuple[Parameter, str], outcome: str, said: str) -> 
     tally.counts[outcome] += 1
     if outcome.isupper():
         tally.notes.append(f"{outcome}: {case[0].name} given {case[1]}\n    {said.strip()}")
-        tally.tell(tally.notes[-1])
 
 
 def main() -> int:
@@ -653,7 +616,8 @@ def main() -> int:
     parser.add_argument("--only", default="", help="part of a parameter's name")
     chosen = cases(parser.parse_args().only)
     with tempfile.TemporaryDirectory() as folder:
-        tally = trial(chosen, Path(folder), tell=lambda text: print(text, flush=True))
+        tally = trial(chosen, Path(folder))
+    print("\n".join(tally.notes))
     for outcome, number in sorted(tally.counts.items()):
         print(f"{number:6} {outcome}")
     print(f"{len(chosen):6} calls, {len({one.name for one, _ in chosen})} parameters")

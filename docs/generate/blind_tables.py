@@ -6,7 +6,6 @@ It comes from scenarios/real_signals/blind_runs.csv, every run of
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Mapping
 from pathlib import Path
@@ -14,8 +13,9 @@ from pathlib import Path
 import numpy as np
 
 from yawbench.studies.confidence import Bounds, crossed_interval
+from yawbench.studies.tables import Table
 
-from .published import replaced, wrapped, write_pages
+from .published import markdown, pages_with, rows_in, wrapped, write_pages
 
 ROOT = Path(__file__).resolve().parents[2]
 RUNS = ROOT / "scenarios" / "real_signals" / "blind_runs.csv"
@@ -34,8 +34,7 @@ Errors = dict[str, np.ndarray]
 
 def published() -> dict[str, Errors]:
     """Return the numbers of all published runs by their metric."""
-    with RUNS.open(encoding="utf-8", newline="") as lines:
-        rows = list(csv.DictReader(lines))
+    rows = rows_in(RUNS)
     runs, seeds = ([*dict.fromkeys(row[key] for row in rows)] for key in ("run", "seed"))
     metrics: dict[str, Errors] = {}
     for row in rows:
@@ -62,15 +61,15 @@ def table_text(metrics: Mapping[str, Errors]) -> str:
     heads = [
         f"{name}, {what}" for name in ESTIMATORS for what in ("rms", "more than if told", "worst second")
     ]
-    lines = [f"| not told | {' | '.join(heads)} |", f"|---|{'---:|' * len(heads)}"]
+    rows = []
     for error in metrics["observer"]:
         cells = []
         for name in ESTIMATORS:
             more = "-" if error == RIGHT else _with_bounds(added(metrics[name])[error], "+")
             worst = metrics[f"{name}_worst"][error].max()
             cells += [f"{metrics[name][error].mean():.2f}°", more, f"{worst:.2f}°"]
-        lines.append(f"| {error} | {' | '.join(cells)} |")
-    return "\n".join(lines)
+        rows.append([error, *cells])
+    return markdown(Table("", ["not told", *heads], rows, numbers={*range(1, 1 + len(heads))}))
 
 
 def _with_bounds(errors: np.ndarray, sign: str = "") -> str:
@@ -121,7 +120,7 @@ def pages_with_tables() -> dict[Path, str]:
         f"{worst_sentences(metrics)} {parameters_sentence(metrics)}"
     )
     text = "\n\n".join([wrapped(first), table_text(metrics), wrapped(note)])
-    return {PAGE: replaced(PAGE.read_text(encoding="utf-8"), "blind tests", text)}
+    return pages_with({PAGE: {"blind tests": text}})
 
 
 if __name__ == "__main__":

@@ -17,7 +17,7 @@ from yawbench.planner import Planner
 from yawbench.proving_ground.handling import TestTrack, fitting_plant, handling_of
 from yawbench.studies.tables import Table
 
-from .published import markdown, replaced
+from .published import markdown, pages_with, rows_in
 
 ROOT = Path(__file__).resolve().parents[2]
 CARS = ROOT / "scenarios" / "vehicles"
@@ -106,11 +106,10 @@ def _columns() -> list[str]:
 
 def cars_table() -> Table:
     """Return the figures of all cars; bold outside the range."""
-    with FIGURES.open(encoding="utf-8", newline="") as lines:
-        rows = [
-            [f"`{row['vehicle']}`", f"`{row['plant']}`", *(one.cell(row[one.column]) for one in RANGES)]
-            for row in csv.DictReader(lines)
-        ]
+    rows = [
+        [f"`{row['vehicle']}`", f"`{row['plant']}`", *(one.cell(row[one.column]) for one in RANGES)]
+        for row in rows_in(FIGURES)
+    ]
     headings = ["vehicle", "plant", *(one.heading for one in RANGES)]
     notes = [f"Bold: outside the published range. {'; '.join(one.source for one in RANGES)}."]
     return Table("", headings, [*rows], notes, {*range(2, len(headings))})
@@ -118,7 +117,7 @@ def cars_table() -> Table:
 
 def pages_with_tables() -> dict[Path, str]:
     """Return docs/vehicles.md with its table written anew."""
-    return {PAGE: replaced(PAGE.read_text(encoding="utf-8"), "cars", markdown(cars_table()))}
+    return pages_with({PAGE: {"cars": markdown(cars_table())}})
 
 
 if __name__ == "__main__":

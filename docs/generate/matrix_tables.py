@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -18,7 +17,7 @@ from yawbench.studies.confidence import ConfidenceInterval
 from yawbench.studies.jobs import STEP_TIME
 from yawbench.studies.tables import Table
 
-from .published import take
+from .published import rows_in, take
 
 ROOT = Path(__file__).resolve().parents[2]
 FILE = ROOT / "scenarios" / "proving_ground" / "ranking.yaml"
@@ -76,37 +75,37 @@ class PublishedCell(RankingCell):
 def published() -> WholeRanking:
     """Return the ranking that follows from the published cells, without what has none yet."""
     ranking = load_ranking(FILE)
-    with RUNS.open(encoding="utf-8", newline="") as lines:
-        cells = {
-            (row["entry"], row["condition"]): PublishedCell(row["entry"], row["condition"], [], row)
-            for row in csv.DictReader(lines)
-        }
+    cells = {
+        (row["entry"], row["condition"]): PublishedCell(row["entry"], row["condition"], [], row)
+        for row in rows_in(RUNS)
+    }
     known = {key for _, key in cells}
     entries = {name: entry for name, entry in ranking.entries.items() if any(name == e for e, _ in cells)}
     ranking = replace(
         ranking, entries=entries, chosen=tuple(name for name in ranking.spec.conditions if name in known)
     )
-    scores = placed([
+    nuisance, scores = _nuisance(ranking), _scores(ranking, cells)
+    return WholeRanking(ranking, {}, [], with_braking(scores, nuisance), nuisance, _settings(ranking))
+
+
+def _scores(ranking: LoadedRanking, cells: Mapping[tuple[str, str], RankingCell]) -> list[EntryScore]:
+    return placed([
         EntryScore(name, spec, {key: cells[name, key] for key in ranking.conditions})
         for name, (spec, _) in ranking.entries.items()
     ])  # fmt: skip
-    nuisance = _nuisance(ranking)
-    settings = _settings(ranking)
-    return WholeRanking(ranking, {}, [], with_braking(scores, nuisance), nuisance, settings)
 
 
 def _nuisance(ranking: LoadedRanking) -> Nuisance | None:
     """Return the published nuisance; None without any."""
     if not NUISANCE.is_file():
         return None
-    with NUISANCE.open(encoding="utf-8", newline="") as lines:
-        runs = [
-            OrdinaryRun(
-                row["entry"], row["situation"], row["car"], row["repeat"] or None, None,
-                {key.partition(" ")[0]: float(row[key]) for key in OF_NUISANCE[4:] if row[key]},
-            )
-            for row in csv.DictReader(lines)
-        ]  # fmt: skip
+    runs = [
+        OrdinaryRun(
+            row["entry"], row["situation"], row["car"], row["repeat"] or None, None,
+            {key.partition(" ")[0]: float(row[key]) for key in OF_NUISANCE[4:] if row[key]},
+        )
+        for row in rows_in(NUISANCE)
+    ]  # fmt: skip
     return nuisance_of(ranking, runs)
 
 
@@ -114,9 +113,7 @@ def _settings(ranking: LoadedRanking) -> list[SettingScores]:
     """Return the published scores under settings, the ranking's own first; none without any."""
     if not SETTINGS.is_file():
         return []
-    with SETTINGS.open(encoding="utf-8", newline="") as lines:
-        rows = [*csv.DictReader(lines)]
-    found = []
+    rows, found = rows_in(SETTINGS), []
     for name in dict.fromkeys(row["setting"] for row in rows):
         if name and name not in ranking.spec.settings:
             continue
@@ -128,11 +125,7 @@ def _settings(ranking: LoadedRanking) -> list[SettingScores]:
             for entry in ranking.entries
             for key in under.conditions
         }
-        scores = placed([
-            EntryScore(entry, spec, {key: cells[entry, key] for key in under.conditions})
-            for entry, (spec, _) in ranking.entries.items()
-        ])  # fmt: skip
-        found.append(SettingScores(name, title, under, scores))
+        found.append(SettingScores(name, title, under, _scores(under, cells)))
     return found
 
 
@@ -145,15 +138,11 @@ def matrix(result: RankingResult) -> Table:
     conditions = result.ranking.conditions
     rows = []
     for score in result.scores:
-        cells = (sign_of(cell) + _spun(cell) for cell in score.cells.values())
+        cells = (sign_of(cell) + " spun" * (cell.state is RankedState.SPUN) for cell in score.cells.values())
         passed = str(score.count(RankedState.PASSED))
         rows.append([str(score.rank), score.spec.title, passed, interval_words(score), *cells])
     headings = [condition.heading.replace("*", r"\*") for condition in conditions.values()]
     return Table("", ["", "controller", "passed", "95 % interval", *headings], [*rows], numbers={0, 2})
-
-
-def _spun(cell: RankingCell) -> str:
-    return " spun" if cell.state is RankedState.SPUN else ""
 
 
 def numbers(result: RankingResult) -> Table:

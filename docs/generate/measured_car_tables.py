@@ -1,4 +1,4 @@
-"""Tables on the measured car: `python -m docs.generate.measured_car_tables`.
+"""Tables on the measured car.
 
 They come from windows.csv and laps_of_estimators.csv in notebooks/ferrari_250_lm, which `convert.py --run`
 there writes from a public recording.
@@ -6,7 +6,6 @@ there writes from a public recording.
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Mapping
 from pathlib import Path
@@ -18,7 +17,7 @@ from yawbench.foundation.messages import listed
 from yawbench.studies.confidence import TAIL, holm, interval, jackknife
 from yawbench.studies.tables import Table
 
-from .published import markdown, replaced, wrapped
+from .published import markdown, pages_with, rows_in, wrapped
 
 ROOT = Path(__file__).resolve().parents[2]
 FOLDER = ROOT / "notebooks" / "ferrari_250_lm"
@@ -34,9 +33,10 @@ SIGNALS = {"yaw_rate": "yaw rate", "acceleration_y": "lateral acceleration", "si
 
 def laps() -> dict[str, dict[str, float]]:
     """Return case -> rms of the sideslip error of each lap, of all and of the worst second [deg]."""
-    with LAPS.open(encoding="utf-8", newline="") as lines:
-        rows = list(csv.DictReader(lines))
-    return {row["case"]: {key: float(value) for key, value in row.items() if key != "case"} for row in rows}
+    return {
+        row["case"]: {key: float(value) for key, value in row.items() if key != "case"}
+        for row in rows_in(LAPS)
+    }
 
 
 def of_laps(case: Mapping[str, float]) -> list[float]:
@@ -47,9 +47,8 @@ def of_laps(case: Mapping[str, float]) -> list[float]:
 def windows() -> dict[tuple[str, str], np.ndarray]:
     """Return model and signal -> rms differences in the held-out windows [SI]."""
     found: dict[tuple[str, str], list[float]] = {}
-    with WINDOWS.open(encoding="utf-8", newline="") as lines:
-        for row in csv.DictReader(lines):
-            found.setdefault((row["model"], row["signal"]), []).append(float(row["rms"]))
+    for row in rows_in(WINDOWS):
+        found.setdefault((row["model"], row["signal"]), []).append(float(row["rms"]))
     return {key: np.array(rms) for key, rms in found.items()}
 
 
@@ -169,27 +168,11 @@ def limits_sentence() -> str:
 
 def pages_with_tables() -> dict[Path, str]:
     """Return the pages with their tables and sentences written anew."""
-    told = {
-        PAGE: {
-            "fit": wrapped(fit_sentences()),
-            "estimators": "\n\n".join(
-                [
-                    markdown(estimators_table()),
-                    wrapped(f"{estimators_sentence()} {parameters_sentence()}"),
-                ]
-            ),
-        },
+    estimators = [
+        markdown(estimators_table()), wrapped(f"{estimators_sentence()} {parameters_sentence()}"),
+    ]  # fmt: skip
+    return pages_with({
+        PAGE: {"fit": wrapped(fit_sentences()), "estimators": "\n\n".join(estimators)},
         ESTIMATORS_PAGE: {"real car": wrapped(estimators_sentence())},
         LIMITS_PAGE: {"real car": wrapped(limits_sentence())},
-    }
-    pages = {}
-    for page, texts in told.items():
-        pages[page] = page.read_text(encoding="utf-8")
-        for name, text in texts.items():
-            pages[page] = replaced(pages[page], name, text)
-    return pages
-
-
-if __name__ == "__main__":
-    for page, text in pages_with_tables().items():
-        page.write_text(text, encoding="utf-8")
+    })  # fmt: skip

@@ -6,7 +6,6 @@ which `--runs TABLE` takes from the study's table.csv.
 
 from __future__ import annotations
 
-import csv
 import math
 import statistics
 from collections.abc import Callable, Iterable, Sequence
@@ -15,8 +14,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from yawbench.studies.confidence import share_bounds
+from yawbench.studies.tables import Table
 
-from .published import replaced, wrapped, write_pages
+from .published import markdown, pages_with, rows_in, wrapped, write_pages
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -107,8 +107,7 @@ def outcomes(rows: Iterable[dict[str, str]]) -> dict[str, Outcome]:
 
 def published() -> dict[str, Outcome]:
     """Return the published outcomes of all runs."""
-    with RUNS.open(encoding="utf-8", newline="") as lines:
-        return outcomes(csv.DictReader(lines))
+    return outcomes(rows_in(RUNS))
 
 
 def share_text(count: int, number: int) -> str:
@@ -149,7 +148,7 @@ def faults_table(results: dict[str, Outcome], paper: str) -> str:
         for monitor in MONITORS.values()
         for what in ("detected [%]", "after [s]", "blamed")
     ]
-    lines = [f"| {paper}, from 1.5 s on | {' | '.join(heads)} |", f"|---|{'---:|---:|---|' * len(MONITORS)}"]
+    rows = []
     for title, name, _ in rows_of_faults():
         if f"without/{paper}/{name}" not in results:
             continue
@@ -161,14 +160,14 @@ def faults_table(results: dict[str, Outcome], paper: str) -> str:
                 median_text(outcome.delays, 2),
                 blamed_text(outcome),
             ]
-        lines.append(f"| {title} | {' | '.join(cells)} |")
-    return "\n".join(lines)
+        rows.append([title, *cells])
+    numbers = {1 + k for k in range(len(heads)) if k % 3 < 2}
+    return markdown(Table("", [f"{paper}, from 1.5 s on", *heads], rows, numbers=numbers))
 
 
 def totals_table(results: dict[str, Outcome]) -> str:
     """Return the table of what the monitors reach over all faults together."""
-    lines = ["| over all faults | " + " | ".join(MONITORS.values()) + " |", f"|---|{'---:|' * len(MONITORS)}"]
-    faults = rows_of_faults()
+    rows, faults = [], rows_of_faults()
     measures: dict[str, Callable[[Outcome, int], bool]] = {
         "faults found in every run": lambda o, s: len(o.delays) == o.number,
         "faults found in no run": lambda o, s: not o.delays,
@@ -181,18 +180,14 @@ def totals_table(results: dict[str, Outcome]) -> str:
         counts = [
             sum(holds(results[f"{key}/B/{name}"], signal) for _, name, signal in faults) for key in MONITORS
         ]
-        lines.append(f"| {title}, of {len(faults)} | {' | '.join(map(str, counts))} |")
-    return "\n".join(lines)
+        rows.append([f"{title}, of {len(faults)}", *map(str, counts)])
+    return markdown(Table("", ["over all faults", *MONITORS.values()], rows, numbers={1, 2}))
 
 
 def blind_table(results: dict[str, Outcome]) -> str:
     """Return the table of the faults that no run or only some runs find, kinds by sizes."""
-    lines = [
-        "| fault | "
-        + " | ".join(f"{word}, {m}" for m in MONITORS.values() for word in ("in no run", "in some runs")),
-        "|---|" + "---|---|" * len(MONITORS),
-    ]
-    lines[0] += " |"
+    heads = [f"{word}, {m}" for m in MONITORS.values() for word in ("in no run", "in some runs")]
+    rows = []
     groups = [
         (f"{kind.title}{'' if kind.unit == '1' else f' [{kind.unit}]'}",
          [(f"{size:g}", name) for size, name in zip(kind.sizes, kind.names(), strict=True)])
@@ -207,31 +202,37 @@ def blind_table(results: dict[str, Outcome]) -> str:
             some = [size for size, outcome in found.items() if 0 < len(outcome.delays) < outcome.number]
             cells += [", ".join(never) or "-", ", ".join(some) or "-"]
         if set(cells) != {"-"}:
-            lines.append(f"| {title} | {' | '.join(cells)} |")
-    return "\n".join(lines)
+            rows.append([title, *cells])
+    return markdown(Table("", ["fault", *heads], rows))
 
 
 def blame_table(results: dict[str, Outcome]) -> str:
     """Return the table of the faults of which some run blames a wrong signal or cannot tell."""
-    lines = ["| fault | " + " | ".join(MONITORS.values()) + " |", f"|---|{'---|' * len(MONITORS)}"]
+    rows = []
     for paper in OFF:
         for title, name, signal in rows_of_faults():
             found = [results.get(f"{key}/{paper}/{name}") for key in MONITORS]
             if any(outcome and outcome.located(signal) < len(outcome.blamed) for outcome in found):
-                cells = [blamed_text(outcome) for outcome in found if outcome]
-                lines.append(f"| {paper}, {title} | {' | '.join(cells)} |")
-    return "\n".join(lines)
+                rows.append([f"{paper}, {title}", *(blamed_text(outcome) for outcome in found if outcome)])
+    return markdown(Table("", ["fault", *MONITORS.values()], rows))
 
 
 def harm_table(results: dict[str, Outcome]) -> str:
     """Return the table of the largest sideslip angles in B where the monitors differ."""
-    heads = ["without a monitor", *MONITORS.values()]
-    lines = [f"| B, largest sideslip angle [deg] | {' | '.join(heads)} |", f"|---|{'---:|' * len(heads)}"]
     titles = {**BESIDE, **{name: title for title, name, _ in rows_of_faults()}}
-    for name in ("none", "gyro_noise_3", "gyro_frozen", "gyro_bias_20", "gyro_drift_10"):
-        cells = [sideslip_text(results[f"{key}/B/{name}"]) for key in ("without", *MONITORS)]
-        lines.append(f"| {titles[name]} | {' | '.join(cells)} |")
-    return "\n".join(lines)
+    return _sideslip("B, largest sideslip angle [deg]", [
+        [titles[name], *_with_monitors(results, f"B/{name}")]
+        for name in ("none", "gyro_noise_3", "gyro_frozen", "gyro_bias_20", "gyro_drift_10")
+    ])  # fmt: skip
+
+
+def _with_monitors(results: dict[str, Outcome], run: str) -> list[str]:
+    return [sideslip_text(results[f"{key}/{run}"]) for key in ("without", *MONITORS)]
+
+
+def _sideslip(what: str, rows: Sequence[Sequence[str]]) -> str:
+    heads = [what, "without a monitor", *MONITORS.values()]
+    return markdown(Table("", heads, rows, numbers={*range(1, len(heads))}))
 
 
 def sideslip_text(outcome: Outcome) -> str:
@@ -245,16 +246,16 @@ def sideslip_text(outcome: Outcome) -> str:
 
 def sideslip_table(results: dict[str, Outcome]) -> str:
     """Return the table of the largest sideslip angles of every run of both papers."""
-    heads = ["without a monitor", *MONITORS.values()]
-    lines = [f"| largest sideslip angle [deg] | {' | '.join(heads)} |", f"|---|{'---:|' * len(heads)}"]
+    rows: list[list[str]] = []
     titles = {**BESIDE, **{name: title for title, name, _ in rows_of_faults()}}
     for paper, off in OFF.items():
-        lines.append(f"| {paper}, no control at all | {sideslip_text(results[off])} | - | - |")
-        for name, title in titles.items():
-            if f"without/{paper}/{name}" in results:
-                cells = [sideslip_text(results[f"{key}/{paper}/{name}"]) for key in ("without", *MONITORS)]
-                lines.append(f"| {paper}, {title} | {' | '.join(cells)} |")
-    return "\n".join(lines)
+        rows.append([f"{paper}, no control at all", sideslip_text(results[off]), "-", "-"])
+        rows += [
+            [f"{paper}, {title}", *_with_monitors(results, f"{paper}/{name}")]
+            for name, title in titles.items()
+            if f"without/{paper}/{name}" in results
+        ]
+    return _sideslip("largest sideslip angle [deg]", rows)
 
 
 def tables(results: dict[str, Outcome]) -> dict[Path, dict[str, str]]:
@@ -298,12 +299,7 @@ def tables(results: dict[str, Outcome]) -> dict[Path, dict[str, str]]:
 
 def pages_with_tables() -> dict[Path, str]:
     """Return the pages with their tables written anew."""
-    pages = {}
-    for page, texts in tables(published()).items():
-        pages[page] = page.read_text(encoding="utf-8")
-        for name, text in texts.items():
-            pages[page] = replaced(pages[page], name, text)
-    return pages
+    return pages_with(tables(published()))
 
 
 def draw(results: dict[str, Outcome]) -> None:

@@ -11,7 +11,6 @@ writes the numbers anew, and `python -m docs.generate` the pages.
 
 from __future__ import annotations
 
-import csv
 import fnmatch
 import json
 from collections.abc import Iterable, Mapping
@@ -30,7 +29,7 @@ from yawbench.studies.result_files import RECORD, VERDICTS
 from yawbench.studies.result_tables import NO_FLIP, flip_words, share, share_words
 from yawbench.vocabulary.gravity import G
 
-from .published import replaced
+from .published import replaced, rows_in
 from .templates import DOCS, reflowed, rendered, row, rule
 
 SCENARIOS = DOCS.parent / "scenarios"
@@ -148,10 +147,8 @@ def numbers_of(folder: Path) -> Numbers:
     found = json.loads((folder / RECORD).read_text(encoding="utf-8"))
     claims = list[Claim]()
     if (folder / VERDICTS).is_file():
-        with (folder / VERDICTS).open(encoding="utf-8", newline="") as lines:
-            claims = [
-                _claim(row) for row in csv.DictReader(lines) if row["group"] == "claims" and row["points"]
-            ]
+        rows = rows_in(folder / VERDICTS)
+        claims = [_claim(row) for row in rows if row["group"] == "claims" and row["points"]]
     return Numbers(
         {
             name: {
@@ -201,9 +198,8 @@ def record(name: str, numbers: Numbers) -> None:
 def found_by_seeds() -> dict[str, dict[str, list[float]]]:
     """Return tuning -> law -> least objective of each seed of the search."""
     found: dict[str, dict[str, list[float]]] = {}
-    with SEEDS.open(encoding="utf-8", newline="") as lines:
-        for row in csv.DictReader(lines):
-            found.setdefault(row["tuning"], {}).setdefault(row["law"], []).append(float(row["objective"]))
+    for seed in rows_in(SEEDS):
+        found.setdefault(seed["tuning"], {}).setdefault(seed["law"], []).append(float(seed["objective"]))
     return found
 
 

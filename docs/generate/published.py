@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 import csv
 import textwrap
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import reduce
 from pathlib import Path
 
 from yawbench.studies.tables import Table
@@ -18,6 +19,20 @@ def replaced(page: str, name: str, text: str) -> str:
     if not found or end not in rest:
         raise ValueError(f"the page has no marks {begin} and {end}")
     return f"{before}{begin}\n\n{text}\n\n{end}{rest.partition(end)[2]}"
+
+
+def pages_with(texts: Mapping[Path, Mapping[str, str]]) -> dict[Path, str]:
+    """Return pages with the texts between their marks replaced; `texts`: page -> name -> text."""
+    return {
+        page: reduce(lambda told, one: replaced(told, *one), of.items(), page.read_text(encoding="utf-8"))
+        for page, of in texts.items()
+    }
+
+
+def rows_in(file: Path) -> list[dict[str, str]]:
+    """Return the rows of a table in a CSV file."""
+    with file.open(encoding="utf-8", newline="") as lines:
+        return list(csv.DictReader(lines))
 
 
 def wrapped(text: str) -> str:
@@ -37,12 +52,10 @@ def markdown(table: Table) -> str:
 
 def take(table: Path, runs: Path, columns: Sequence[str]) -> None:
     """Write the published runs from the columns of a table."""
-    with table.open(encoding="utf-8", newline="") as lines:
-        rows = list(csv.DictReader(lines))
     with runs.open("w", encoding="utf-8", newline="") as out:
         writer = csv.DictWriter(out, columns, extrasaction="ignore", lineterminator="\n")
         writer.writeheader()
-        writer.writerows(rows)
+        writer.writerows(rows_in(table))
 
 
 def write_pages(

@@ -52,7 +52,7 @@ class Matrix:
         self.result = result
         self.laws: list[EntryScore] = [score for score in result.scores if score.spec.fmu != IDLE]
         self.conditions = len(result.ranking.conditions)
-        self.pairs = len(self.laws) * (len(self.laws) - 1) // 2
+        self.pairs = math.comb(len(self.laws), 2)
         self.settings = settings_sentence(result.settings)
         self.nuisance = nuisance_sentence(result.nuisance) if result.nuisance else ""
         self.answer = ranking_page.answer(result)

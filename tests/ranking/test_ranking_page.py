@@ -6,6 +6,7 @@ import contextlib
 import io
 import json
 import shutil
+from dataclasses import replace
 from math import degrees
 from pathlib import Path
 from types import SimpleNamespace
@@ -18,7 +19,8 @@ from tests.ranking.test_ranking import SMALL, rows
 from tests.refusals import mentions
 from tests.reports.browser import DESK, HELD, PHONE, Browser
 from tests.reports.flaws import flaws_in_print, inaccessible, looks
-from yawbench.ranking.ranking_page import result_of_threats
+from yawbench.ranking.ranking import load_ranking
+from yawbench.ranking.ranking_page import sentence_of_threats
 
 RANKING = Path(__file__).parents[2] / "scenarios/proving_ground/ranking.yaml"
 
@@ -108,10 +110,12 @@ def test_the_first_cell_is_open_and_all_of_it_can_be_read_by_everyone(
 
 
 def test_threats_are_quoted_where_they_can_be_read(tmp_path):
-    assert "clearly better" in result_of_threats(RANKING.parent / "threats.yaml")
-    assert result_of_threats(tmp_path / "threats.yaml") == ""
+    ranking = load_ranking(RANKING)
+    assert "clearly better" in sentence_of_threats(ranking)
+    alone = replace(ranking, path=tmp_path / "ranking.yaml")
+    assert sentence_of_threats(alone) == ""
     shutil.copy(RANKING.parent / "threats.yaml", tmp_path)  # without its published levels
-    assert "is not known" in result_of_threats(tmp_path / "threats.yaml")
+    assert "is not known" in sentence_of_threats(alone)
 
 
 def test_a_cell_shows_its_worst_run_while_the_matrix_stays_in_sight(chromium: Browser, page):

@@ -1,4 +1,4 @@
-"""Values altered in files of users and in records, a sample; `python -m campaigns.altered` tries more."""
+"""Files of users and records altered at random, a sample; `python -m campaigns.altered` tries more."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from campaigns.altered import GROUPS, Folder, base, trial
-from campaigns.full_disk import trial as on_a_full_disk
-from campaigns.kills import COMMANDS, UNITS, build_all
+from campaigns.kills import COMMANDS, UNITS, build_all, on_a_full_disk
+from campaigns.kills import trial as trial_of_command
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="forks, and limits the child")
 
@@ -34,6 +34,6 @@ def test_a_command_on_a_full_disk_fails_in_a_sentence_and_the_next_call_gives_al
     command: str, tmp_path: Path
 ) -> None:
     build_all(tmp_path / "fmus", components=UNITS)
-    counts, notes = on_a_full_disk(command, 1, 5, tmp_path, tmp_path / "fmus")
+    counts, notes = trial_of_command(command, 1, 5, tmp_path, tmp_path / "fmus", on_a_full_disk)
     assert notes == []
     assert counts["held"] == 1

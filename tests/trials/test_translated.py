@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
-from campaigns import classes
-from campaigns.class_programs import program as program_of_classes
-from campaigns.random_programs import FUNCTION, KINDS, OBJECT, program
-from campaigns.translated import REFUSED, SAME, kind_of, trial, tried
+from campaigns.random_programs import FUNCTION, KINDS, OBJECT
+from campaigns.translated import REFUSED, SAME, kind_of, law_of_classes, program_of, trial, tried
 
 FEW = (1, 9, 17, 34)
 """Seeds of programs of all kinds that are translated, not refused."""
 
 
-def check(seeds: Sequence[int], same: int) -> None:
+def check(seeds: Sequence[int], same: int, made: Any = program_of) -> None:
     """Check that no program is wrong, and that enough of them are translated."""
-    tally = trial(seeds)
-    assert not tally.bad, "\n".join(
-        f"{seed}: {why}\n{program(seed, kind_of(seed))}" for seed, why in tally.bad
-    )
+    tally = trial(seeds, made)
+    assert not tally.bad, "\n".join(f"{one.seed}: {why}\n{one.text}" for one, why in tally.bad)
     assert tally.counts[SAME] >= same
 
 
@@ -27,14 +24,8 @@ def test_a_few_random_programs_give_the_same_bytes() -> None:
     check(FEW, len(FEW))
 
 
-def check_classes(seeds: Sequence[int], same: int) -> None:
-    tally = classes.trial(seeds)
-    assert not tally.bad, "\n".join(f"{seed}: {why}\n{program_of_classes(seed)}" for seed, why in tally.bad)
-    assert tally.counts[SAME] >= same
-
-
 def test_a_few_random_programs_of_classes_give_the_same_bytes() -> None:
-    check_classes(range(2_000_000, 2_000_012), 4)
+    check(range(2_000_000, 2_000_012), 4, law_of_classes)
 
 
 LAW = """

@@ -25,6 +25,7 @@ from yawbench.foundation.messages import counted, listed
 from yawbench.measurements.measurement import MEASURABLE, Measurement, load_measurement
 from yawbench.measurements.segment import LowPass, Segment, running_median, without_spikes
 from yawbench.orchestrator.recordings.gaps import Gap, by_signals
+from yawbench.proving_ground.trace import likeness
 from yawbench.vehicles.motion import standing
 from yawbench.vocabulary.motion import ANGLES
 
@@ -266,12 +267,12 @@ def _contradiction(parts: Sequence[Segment]) -> Flaw | None:
     signals, slopes = motion.signals, motion.slopes
     r, a_y, v = (signals[name] for name in MOTION)
     turning = r * v
-    likeness = _likeness(a_y, turning)
-    if abs(likeness) < LIKE:
+    alike = likeness(a_y, turning)
+    if abs(alike) < LIKE:
         return None
     if (flaw := _factor(float(np.sqrt(np.sum(a_y * a_y) / np.sum(turning * turning))))) is not None:
         return flaw
-    if likeness < 0.0:
+    if alike < 0.0:
         return _sign(signals)
     if (flaw := _steering(signals)) is not None or "side" not in signals:
         return flaw
@@ -287,12 +288,6 @@ def _contradiction(parts: Sequence[Segment]) -> Flaw | None:
             (FlawKind.SIGN, name): slopes["side"],
         },
     )
-
-
-def _likeness(a: np.ndarray, b: np.ndarray) -> float:
-    """Return the normalized product of two signals, from -1 to 1; 0 if one of them is zero."""
-    size = float(np.sqrt(np.sum(a * a) * np.sum(b * b)))
-    return float(np.sum(a * b)) / size if size else 0.0
 
 
 def _against_position(parts: Sequence[Segment]) -> Flaw | None:
@@ -340,11 +335,10 @@ def _sign(signals: Mapping[str, np.ndarray]) -> Flaw:
 
     Without a steering that is like one of them, it is a flaw of both.
     """
-    likeness = next(
-        (_likeness(signals[name], signals["yaw_rate"]) for name in STEERING if name in signals), 0.0
-    )
-    if abs(likeness) >= LIKE:
-        name = "yaw_rate" if likeness < 0.0 else "acceleration_y"
+    of_yaw_rate = (likeness(signals[name], signals["yaw_rate"]) for name in STEERING if name in signals)
+    alike = next(of_yaw_rate, 0.0)
+    if abs(alike) >= LIKE:
+        name = "yaw_rate" if alike < 0.0 else "acceleration_y"
         return Flaw(FlawKind.SIGN, name, -1.0, _described(FlawKind.SIGN, name, -1.0))
     words = (
         "are opposed to each other: one of them needs 'sign: -1', and they alone do not tell which; a signal "
@@ -355,7 +349,7 @@ def _sign(signals: Mapping[str, np.ndarray]) -> Flaw:
 
 def _steering(signals: Mapping[str, np.ndarray]) -> Flaw | None:
     for name in STEERING:
-        if name in signals and _likeness(signals[name], signals["yaw_rate"]) < -LIKE:
+        if name in signals and likeness(signals[name], signals["yaw_rate"]) < -LIKE:
             words = (
                 "is opposed to yaw_rate and acceleration_y: 'sign: -1', or the same for both of them; all "
                 "are positive to the left"

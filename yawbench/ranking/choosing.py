@@ -9,12 +9,12 @@ situations and cars (`studies.confidence`). Times depend on the computer and are
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from itertools import combinations
+from collections.abc import Sequence
+from math import comb
 
 import numpy as np
 
-from yawbench.studies.confidence import crossed_probability, sign_test, told_apart
+from yawbench.studies.confidence import ToldApart, crossed_probability, sign_test, told_apart
 from yawbench.studies.tables import Cell, Table
 
 from .ranking_scores import IDLE, EntryScore, RankedState, apart_by_conditions
@@ -48,7 +48,7 @@ def choosing_table(ranked: WholeRanking, threats: ThreatResult | None) -> Table:
     rows: list[list[Cell]] = [
         [
             score.spec.title, f"{score.count(RankedState.PASSED)} of {len(score.cells)}",
-            share_text(score.braking), _whole(score.mean("intervention")), _whole(_micro(score.step_time)),
+            share_text(score.braking), _whole(score.mean("intervention")), _whole(score.step_time, 1e6),
             *of_levels.get(score.entry, [None] * len(names)),
         ]
         for score in scores
@@ -69,25 +69,19 @@ NOTE = (
 )
 
 
-def _whole(number: float | None) -> str | None:
-    return None if number is None else f"{number:.0f}"
-
-
-def _micro(number: float | None) -> float | None:
-    return None if number is None else 1e6 * number
+def _whole(number: float | None, factor: float = 1.0) -> str | None:
+    return None if number is None else f"{factor * number:.0f}"
 
 
 def _clear_pairs(ranked: WholeRanking, scores: Sequence[EntryScore]) -> list[str | None]:
     """Return the clear pairs by conditions, nuisance and intervention, and none for the time."""
     if len(scores) < 2:
         return [None] * 4
-    pairs = len(scores) * (len(scores) - 1) // 2
-    passed = f"{apart_by_conditions(scores).better.sum()} of {pairs}"
-    nuisance = None
+    passed, nuisance = _of_pairs(apart_by_conditions(scores), len(scores)), None
     if ranked.nuisance:
         entries = [score.entry for score in ranked.nuisance.complete]
         own = [entries.index(score.entry) for score in scores if score.entry in entries]
-        nuisance = f"{ranked.nuisance.apart.of(own).better.sum()} of {len(own) * (len(own) - 1) // 2}"
+        nuisance = _of_pairs(ranked.nuisance.apart.of(own), len(own))
     return [passed, nuisance, _by_sign(scores, "intervention"), None]
 
 
@@ -101,7 +95,7 @@ def _by_sign(scores: Sequence[EntryScore], key: str) -> str | None:
     def probability(i: int, j: int) -> float:
         return sign_test(table[i] < table[j], table[j] < table[i])
 
-    return _counted(-table.mean(axis=1), probability)
+    return _of_pairs(told_apart(-table.mean(axis=1), probability), len(table))
 
 
 def _clear_levels(threats: ThreatResult | None, scores: Sequence[EntryScore], name: str) -> str | None:
@@ -118,9 +112,8 @@ def _clear_levels(threats: ThreatResult | None, scores: Sequence[EntryScore], na
     def probability(i: int, j: int) -> float:
         return crossed_probability(positions[i] - positions[j])
 
-    return _counted(positions.mean(axis=(1, 2)), probability)
+    return _of_pairs(told_apart(positions.mean(axis=(1, 2)), probability), len(positions))
 
 
-def _counted(numbers: np.ndarray, probability: Callable[[int, int], float]) -> str:
-    pairs = len([*combinations(range(len(numbers)), 2)])
-    return f"{told_apart(numbers, probability).better.sum()} of {pairs}"
+def _of_pairs(apart: ToldApart, number: int) -> str:
+    return f"{apart.better.sum()} of {comb(number, 2)}"

@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from itertools import product
+from math import comb
 from typing import Any
 
 import numpy as np
@@ -22,15 +22,24 @@ from yawbench.figures.display import digits_of
 from yawbench.orchestrator.plan import Override
 from yawbench.orchestrator.scenario.schema_validation import made
 from yawbench.proving_ground.sine_with_dwell import AMPLITUDE
-from yawbench.studies.axes import Level, axis_of_levels
-from yawbench.studies.claim_schema import MetricSpec, text_of
+from yawbench.studies.axes import Level
+from yawbench.studies.claim_schema import MetricSpec
 from yawbench.studies.confidence import ToldApart, crossed_probability, told_apart
 from yawbench.studies.executor import Executor
 from yawbench.studies.experiment import LoadedExperiment, NamedRun, experiment_of
 from yawbench.studies.jobs import MeasuredRun
 from yawbench.studies.tables import Cell, Table, column
 
-from .ranking import RECORDED, EntrySpec, LoadedRanking, OrdinarySpec, angle_experiment, angles_of
+from .ranking import (
+    RECORDED,
+    EntrySpec,
+    LoadedRanking,
+    OrdinarySpec,
+    angle_experiment,
+    angles_of,
+    axes_of_repeats,
+    repeats_of,
+)
 from .ranking_scores import IDLE
 from .ranking_tables import share_text
 
@@ -179,10 +188,6 @@ def nuisance_experiment(
         ScenarioError: a scenario is wrong.
     """
     runs, places, design = [], {}, []
-    repeated: dict[str, dict[Any, str]] = {}
-    for spec in ranking.spec.ordinary.values():
-        for place, values in spec.repeats.items():
-            repeated.setdefault(place, {}).update((value, text_of(value)) for value in values)
     for name, spec in ranking.spec.ordinary.items():
         for car in spec.cars or ranking.spec.cars:
             key = f"{name}/{car}"
@@ -193,33 +198,17 @@ def nuisance_experiment(
             places[key] = name, car
             title = f"{spec.title}, {car}"
             runs.append(NamedRun(key, title, title, ranking.scenario(spec.scenario), changes))
-            levels = [
-                [Level(value, values[value]) for value in spec.repeats.get(place, [*values][:1])]
-                for place, values in repeated.items()
-            ]
             design += [
                 (key, (Level(entry, entry), *repeat))
                 for entry in ranking.entries
-                for repeat in product(*levels)
+                for repeat in repeats_of(ranking.spec.ordinary, spec)
             ]
-    axes = {"entry": ranking.axis_of(ranking.entries)}
-    for place, known in repeated.items():
-        of = [key for key, (name, _) in places.items() if place in ranking.spec.ordinary[name].repeats]
-        axes[place] = axis_of_levels(
-            place, [Level(*level) for level in known.items()], runs=of, repeats=len(known) > 1
-        )
+    axes = axes_of_repeats(ranking, {key: ranking.spec.ordinary[name] for key, (name, _) in places.items()})
     experiment = experiment_of(
         ranking.path, runs, title=f"{ranking.spec.title}: ordinary driving", axes=axes, design=design,
         origin="ranking", metrics={key: made(MetricSpec, metric=name) for key, name in METRICS.items()},
     )  # fmt: skip
     return experiment, places
-
-
-def cars_of(ranking: LoadedRanking) -> list[str]:
-    """Return the cars that ordinary driving needs."""
-    return list(dict.fromkeys(
-        car for spec in ranking.spec.ordinary.values() for car in spec.cars or ranking.spec.cars
-    ))  # fmt: skip
 
 
 def run_nuisance(ranking: LoadedRanking, execute: Executor, *, only: Collection[str] = ()) -> Nuisance:
@@ -228,7 +217,8 @@ def run_nuisance(ranking: LoadedRanking, execute: Executor, *, only: Collection[
     Raises:
         YawbenchError: a run cannot start.
     """
-    cars = cars_of(ranking)
+    specs = ranking.spec.ordinary.values()
+    cars = list(dict.fromkeys(car for spec in specs for car in spec.cars or ranking.spec.cars))
     slow = execute(angle_experiment(ranking, execute, cars), keep=False).of_models()
     experiment, places = nuisance_experiment(ranking, angles_of(ranking, slow, cars), execute)
     result = execute(
@@ -309,7 +299,7 @@ def nuisance_sentence(nuisance: Nuisance) -> str:
     least, most = controllers[0], controllers[-1]
     own = [k for k, score in enumerate(nuisance.complete) if score.spec.fmu != IDLE]
     among = nuisance.apart.of(own)
-    pairs = len(own) * (len(own) - 1) // 2
+    pairs = comb(len(own), 2)
     if len(own) < 2:
         return f"In ordinary driving {least.spec.title} brakes for {share_text(least.braking())} of the time."
     return (

@@ -421,13 +421,11 @@ def dwell_experiment(
     Raises:
         ScenarioError: a scenario is wrong.
     """
-    runs, repeated = [], dict[str, dict[Any, str]]()
+    runs = []
     for name, condition in ranking.conditions.items():
         scenario, test = ranking.scenario(condition.scenario), (SERIES, angles[condition.car])
         changes = ranking.changes_of_condition(name)
         runs.append(NamedRun(name, condition.title, condition.title, scenario, changes, test))
-        for place, values in condition.repeats.items():
-            repeated.setdefault(place, {}).update((value, text_of(value)) for value in values)
     runs = [
         replace(run, windows={"intervention": window} if (window := _since_steering(plan)) else {})
         for run, plan in zip(runs, execute.plans(runs), strict=True)
@@ -436,14 +434,9 @@ def dwell_experiment(
         (run.name, (Level(entry, entry), *repeat, amplitude))
         for run in runs
         for entry in ranking.entries
-        for repeat, amplitude in _levels(ranking, run.name, repeated, angles)
+        for repeat, amplitude in _levels(ranking, run.name, angles)
     ]
-    axes = {"entry": ranking.axis_of(ranking.entries)}
-    for place, levels in repeated.items():
-        of = [name for name, condition in ranking.conditions.items() if place in condition.repeats]
-        axes[place] = axis_of_levels(
-            place, [Level(*level) for level in levels.items()], runs=of, repeats=True
-        )
+    axes = axes_of_repeats(ranking, ranking.conditions)
     axes["amplitude"] = axis_of_levels(AMPLITUDE, [point[-1] for _, point in design])
     return experiment_of(
         ranking.path, runs, title=ranking.spec.title, axes=axes, design=design, origin="ranking",
@@ -451,21 +444,49 @@ def dwell_experiment(
     )  # fmt: skip
 
 
+Repeated = Mapping[str, ConditionSpec | OrdinarySpec]
+"""Name of a run -> what may repeat it."""
+
+
+def _repeated(runs: Repeated) -> dict[str, list[Level]]:
+    """Return the levels of all repeats of runs: instance.parameter -> values."""
+    levels: dict[str, dict[Any, Level]] = {}
+    for spec in runs.values():
+        for place, values in spec.repeats.items():
+            levels.setdefault(place, {}).update((value, Level(value, text_of(value))) for value in values)
+    return {place: [*known.values()] for place, known in levels.items()}
+
+
+def repeats_of(runs: Repeated, spec: ConditionSpec | OrdinarySpec) -> list[tuple[Level, ...]]:
+    """Return the points of one of the runs on the axes of all repeats."""
+    return [*product(*(
+        [level for level in levels if level.value in spec.repeats.get(place, [levels[0].value])]
+        for place, levels in _repeated(runs).items()
+    ))]  # fmt: skip
+
+
+def axes_of_repeats(ranking: LoadedRanking, runs: Repeated) -> dict[str, DesignAxisSpec]:
+    """Return the axes of runs that all entries drive: entries and repeats."""
+    return {"entry": ranking.axis_of(ranking.entries)} | {
+        place: axis_of_levels(
+            place, levels, runs=[name for name, spec in runs.items() if place in spec.repeats],
+            repeats=len(levels) > 1,
+        )
+        for place, levels in _repeated(runs).items()
+    }  # fmt: skip
+
+
 def _levels(
-    ranking: LoadedRanking, name: str, repeated: Mapping[str, Mapping[Any, str]], angles: Mapping[str, float]
-) -> Iterator[tuple[list[Level], Level]]:
-    """Yield the levels of repeats and amplitude of a condition; `repeated`: all levels of repeats."""
+    ranking: LoadedRanking, name: str, angles: Mapping[str, float]
+) -> Iterator[tuple[tuple[Level, ...], Level]]:
+    """Yield the levels of repeats and amplitude of a condition."""
     condition = ranking.spec.conditions[name]
     rungs = amplitudes(angles[condition.car])[:: -(condition.every or ranking.spec.every)][::-1]
     sides = SIDES[:1] if condition.mirrored else SIDES
-    repeats = [
-        [Level(value, values[value]) for value in condition.repeats.get(place, [*values][:1])]
-        for place, values in repeated.items()
-    ]
     for _, sign in sides:
-        for repeat in product(*repeats):
+        for repeat in repeats_of(ranking.conditions, condition):
             for rung in rungs[-1:] if ranking.quick else rungs:
-                yield [*repeat], Level(sign * rung, f"{math.degrees(sign * rung):.1f} deg")
+                yield repeat, Level(sign * rung, f"{math.degrees(sign * rung):.1f} deg")
 
 
 def _since_steering(plan: Plan) -> TimeWindow | None:

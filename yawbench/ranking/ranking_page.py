@@ -31,7 +31,7 @@ from yawbench.studies.tables import Table
 
 from .choosing import choosing_table
 from .nuisance import nuisance_sentence, nuisance_table
-from .ranking import SERIES, EntrySpec
+from .ranking import SERIES, EntrySpec, LoadedRanking
 from .ranking_scores import (
     IDLE,
     Digits,
@@ -173,7 +173,7 @@ def ranking_page(ranked: WholeRanking, folder: Path, command: str, each: Each = 
     lost = next(
         (cell for _, cell in cells if cell.state in (RankedState.FAILED, RankedState.SPUN)), cells[0][1]
     )
-    table = table_of(ranked)
+    table, pareto = table_of(ranked), folder / FIGURES / "pareto.svg"
     view = RankingPage(
         title=ranking.spec.title,
         answer=answer(ranked),
@@ -187,7 +187,7 @@ def ranking_page(ranked: WholeRanking, folder: Path, command: str, each: Each = 
         rows=_rows(ranked, digits),
         first_cell=_id(lost),
         frame=embedded(None, "run"),
-        pareto=_image(folder / FIGURES / "pareto.svg", "Stability over intervention"),
+        pareto=image_of(pareto, "Stability over intervention") if pareto.is_file() else None,
         table=Table("", table.columns, table.rows),
         described=_conditions(ranked),
         entries=_entries(ranked),
@@ -223,8 +223,7 @@ def answer(ranked: WholeRanking) -> str:
     first_of_all = settings_sentence(ranked.settings)
     ordinary = nuisance_sentence(ranked.nuisance) if ranked.nuisance else ""
     surely = apart_sentence(apart_by_conditions(placed), [score.spec.fmu == IDLE for score in placed])
-    quoted = ranked.ranking.spec.threat_file
-    threats = result_of_threats(ranked.ranking.path.parent / quoted) if quoted else ""
+    threats = sentence_of_threats(ranked.ranking)
     return " ".join(filter(None, (first_of_all, result, surely, ordinary, threats)))
 
 
@@ -232,10 +231,10 @@ def beside_matrix(ranked: WholeRanking) -> list[Table]:
     """Return the tables beside the matrix: choosing a law, other settings, nuisance; none of a quick look."""
     tables = []
     if ranked.nuisance:
-        quoted = ranked.ranking.spec.threat_file
-        tables.append(
-            choosing_table(ranked, _published(ranked.ranking.path.parent / quoted) if quoted else None)
-        )
+        published = None
+        with suppress(ScenarioError):
+            published = published_threats(ranked.ranking)
+        tables.append(choosing_table(ranked, published))
     if ranked.settings:
         tables += [settings_table(ranked.settings), entries_table(ranked.settings)]
     if ranked.nuisance:
@@ -243,24 +242,23 @@ def beside_matrix(ranked: WholeRanking) -> list[Table]:
     return tables
 
 
-def _published(file: Path) -> ThreatResult | None:
-    """Return the published levels of a threat file; None without any."""
-    if not file.is_file():
-        return None
-    with suppress(ScenarioError):
-        return published_result(load_threats(file))
-    return None
+def published_threats(ranking: LoadedRanking) -> ThreatResult | None:
+    """Return the published levels of the threat file that a ranking quotes; None if it quotes none.
+
+    Raises:
+        ScenarioError: a file is invalid.
+    """
+    file = ranking.path.parent / ranking.spec.threat_file
+    return published_result(load_threats(file)) if file.is_file() else None
 
 
-def result_of_threats(file: Path) -> str:
-    """Return how many the published levels of a threat file tell apart; "" without any."""
-    if not file.is_file():
-        return ""
+def sentence_of_threats(ranking: LoadedRanking) -> str:
+    """Return how many the published levels of threats tell apart; "" without any."""
     try:
-        result = published_result(load_threats(file))
+        result = published_threats(ranking)
     except ScenarioError as error:  # the runs are made: the page is written without them
         return f"How many are told apart by threats is not known: {error}."
-    if not result.complete[result.threats.main]:
+    if result is None or not result.complete[result.threats.main]:
         return ""
     table = scored(result)
     sharing = sum(score.place == 1 for score in table.scores)
@@ -268,10 +266,6 @@ def result_of_threats(file: Path) -> str:
         f"By threats turned up until the car is lost (published levels) {counted(sharing, 'controller')} "
         f"{'is first' if sharing == 1 else 'share the first place'}. {told_apart(table)}"
     )
-
-
-def _image(file: Path, title: str) -> FigureImage | None:
-    return image_of(file, title) if file.is_file() else None
 
 
 def _rows(ranked: WholeRanking, digits: Digits) -> list[MatrixRow]:

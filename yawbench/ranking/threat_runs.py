@@ -400,14 +400,18 @@ def published_result(threats: LoadedThreats) -> ThreatResult:
     return ThreatResult(threats, {}, survived, quantities, units, entries, passed)
 
 
+def _rows(path: Path | str) -> list[dict[str, str]]:
+    with Path(path).open(encoding="utf-8", newline="") as lines:
+        return list(csv.DictReader(lines))
+
+
 @reads("table of levels", ScenarioError)
 def _published_levels(path: Path | str, threats: LoadedThreats) -> dict[SearchPlace, Survived]:
     wanted, levels = set(threats.searches()), {}
-    with Path(path).open(encoding="utf-8", newline="") as lines:
-        for row in csv.DictReader(lines):
-            place = SearchPlace(*(row[key] for key in SearchPlace._fields))
-            if place in wanted:
-                levels[place] = Survived(float(row["position"]), row["end"])  # type: ignore[arg-type]
+    for row in _rows(path):
+        place = SearchPlace(*(row[key] for key in SearchPlace._fields))
+        if place in wanted:
+            levels[place] = Survived(float(row["position"]), row["end"])  # type: ignore[arg-type]
     return levels
 
 
@@ -417,21 +421,19 @@ def _published_quantities(
 ) -> tuple[Quantities, dict[tuple[str, str], str]]:
     quantities: Quantities = {}
     units = {}
-    with Path(path).open(encoding="utf-8", newline="") as lines:
-        for row in csv.DictReader(lines):
-            name, key = row["discipline"], row["quantity"]
-            if name in threats.spec.disciplines:
-                units[name, key] = row["unit"]
-                value = float(row["value"]) if row["value"] else None
-                quantities.setdefault((name, row["car"], row["entry"]), {})[key] = value
+    for row in _rows(path):
+        name, key = row["discipline"], row["quantity"]
+        if name in threats.spec.disciplines:
+            units[name, key] = row["unit"]
+            value = float(row["value"]) if row["value"] else None
+            quantities.setdefault((name, row["car"], row["entry"]), {})[key] = value
     return quantities, units
 
 
 @reads("table of a ranking", ScenarioError)
 def _published_matrix(path: Path | str) -> dict[str, tuple[int, int]]:
     cells: dict[str, list[str]] = {}
-    with Path(path).open(encoding="utf-8", newline="") as lines:
-        for row in csv.DictReader(lines):
-            cells.setdefault(row["entry"], []).append(row["state"])
+    for row in _rows(path):
+        cells.setdefault(row["entry"], []).append(row["state"])
     passed = RankedState.PASSED.value
     return {entry: (states.count(passed), len(states)) for entry, states in cells.items()}

@@ -24,7 +24,17 @@ from yawbench.orchestrator.wiring.context import reached
 from yawbench.planner import Planner
 from yawbench.vocabulary.facts import FACTS
 
-from .axes import AxisSpec, DesignAxisSpec, DesignPoint, Level, changes_at, crossed, grid, levels_of
+from .axes import (
+    AxisSpec,
+    DesignAxisSpec,
+    DesignPoint,
+    Level,
+    VariantSpec,
+    changes_at,
+    crossed,
+    grid,
+    levels_of,
+)
 from .claim_schema import MetricReference, MetricSpec, si_number
 from .jobs import Job, MetricRequests, TestRequest, key_of, plans_of
 from .on_demand import OnDemand
@@ -53,6 +63,11 @@ class NamedRun:
     test: TestRequest | None = None  # the standard test that judges it
     windows: Mapping[str, TimeWindow] = field(default_factory=dict)
     """Key of a metric -> window [s] in place of the metric's."""
+
+    def scenario_in(self, variant: VariantSpec, folder: Path) -> Path | None:
+        """Return what a variant, of a file in `folder`, puts in place of the scenario; None: nothing."""
+        named = variant.scenario.replace("{scenario}", self.scenario.stem)
+        return folder / named if named else None
 
 
 @dataclass(frozen=True)
@@ -154,9 +169,8 @@ class LoadedExperiment(LoadedFile):
         """Return the scenario of a run at a point."""
         scenario = run.scenario
         for axis, level in zip(self.spec.axes.values(), point, strict=True):
-            named = axis.variants[str(level.value)].scenario if axis.variants else ""
-            if named and any(fnmatchcase(run.name, pattern) for pattern in axis.runs):
-                scenario = self.path.parent / named.replace("{scenario}", run.scenario.stem)
+            if axis.variants and any(fnmatchcase(run.name, pattern) for pattern in axis.runs):
+                scenario = run.scenario_in(axis.variants[str(level.value)], self.path.parent) or scenario
         return scenario
 
     def setting(self, point: DesignPoint) -> DesignPoint:

@@ -22,7 +22,7 @@ from yawbench.orchestrator.signal_names import Target
 from yawbench.orchestrator.wiring.context import found_at
 from yawbench.planner import Planner
 
-from .axes import DesignPoint, Level, OpenValueSpec, VariantSpec, changes_at, levels_of, points_at
+from .axes import DesignPoint, Level, OpenValueSpec, changes_at, levels_of, points_at
 from .claim_schema import Claim, MetricReference
 from .claims import ONE_IN, TIMES, LevelVerdict, OpenValueScan, Region, judge
 from .confidence import Decision, SequentialTest
@@ -96,9 +96,9 @@ class RegionRuns:
         if run not in self.experiment.matching(open_value.runs):
             return False
         if open_value.kind == "variant":
-            scenarios = [self._scenario(variant, run) for variant in open_value.variants.values()]
-            own = [variant for variant in open_value.variants.values() if not variant.scenario]
-            targets = [target for variant in own for target in variant.targets]
+            folder, variants = self.experiment.path.parent, open_value.variants.values()
+            scenarios = [run.scenario_in(variant, folder) or run.scenario for variant in variants]
+            targets = [target for variant in variants if not variant.scenario for target in variant.targets]
             return all(path.is_file() for path in scenarios) and self._has(run, targets, open_value.times)
         return self._has(run, open_value.vary, open_value.times)
 
@@ -110,14 +110,9 @@ class RegionRuns:
             for target in targets
         )
 
-    def _scenario(self, variant: VariantSpec, run: NamedRun) -> Path:
-        """Return the scenario of a run at a variant."""
-        named = variant.scenario.replace("{scenario}", run.scenario.stem)
-        return self.experiment.path.parent / named if named else run.scenario
-
     def changes(self, name: str, point: RegionPoint) -> tuple[Path, list[Override]]:
         """Return the scenario of a run at a point, and the further overrides there."""
-        run, changes = self.experiment.runs[name], []
+        run, changes, folder = self.experiment.runs[name], [], self.experiment.path.parent
         scenario = run.scenario
         for key, level in point:
             open_value = self.open_values[key]
@@ -126,9 +121,9 @@ class RegionRuns:
                     own = self.own_value(run.name, where)
                     changes.append(Override(where, float(own or 0.0) * float(level.value), ORIGIN))
                 continue
-            if open_value.kind == "variant" and open_value.variants[str(level.value)].scenario:
-                scenario = self._scenario(open_value.variants[str(level.value)], run)
-            changes += changes_at(open_value, level, self.experiment.path.parent, ORIGIN)
+            if open_value.kind == "variant":
+                scenario = run.scenario_in(open_value.variants[str(level.value)], folder) or scenario
+            changes += changes_at(open_value, level, folder, ORIGIN)
         return scenario, changes
 
     def cell(self, name: str, point: RegionPoint) -> RegionCell:

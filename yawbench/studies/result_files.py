@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from yawbench.foundation.errors import ResultsError
-from yawbench.foundation.safe_files import reason, write_whole
+from yawbench.foundation.safe_files import write_whole
 from yawbench.metrics.expressions import MetricValue, metric
 from yawbench.metrics.measures import si
 from yawbench.orchestrator.results.reader import Results
@@ -99,26 +98,6 @@ def verdict_columns(findings: ExperimentResult) -> Table:
     )
 
 
-def write_table(findings: ExperimentResult, out: Path) -> None:
-    """Write table, verdicts and what a sample tells as CSV, and the table as Parquet with units in it.
-
-    Raises:
-        ResultsError: a file cannot be written.
-    """
-    table = columns_of(findings)
-    contents: dict[str, str | bytes] = {TABLE[0]: to_csv(table), TABLE[1]: _parquet(findings, table)}
-    if findings.spec.claims or findings.spec.checks:
-        contents[VERDICTS] = to_csv(verdict_columns(findings))
-    contents |= {f"{name}.csv": to_csv(columns) for name, columns in sample_columns(findings).items()}
-    for name, content in contents.items():
-        try:
-            write_whole(out / name, content)
-        except OSError as error:  # noqa: PERF203 - two files
-            raise ResultsError(
-                f"{out / name}: cannot be written: {reason(error)}.", code="results-unwritable"
-            ) from None
-
-
 def _parquet(findings: ExperimentResult, table: Table) -> bytes:
     import pyarrow as pa
     import pyarrow.parquet as pq
@@ -167,14 +146,24 @@ RECORD = "experiment.json"
 
 
 def write_findings(findings: ExperimentResult, drawn: dict[str, str], out: Path) -> None:
-    """Write tables and record into a folder; `drawn`: name -> title of its figures.
+    """Write table (also as Parquet, with units in it), verdicts, what a sample tells, and the record.
+
+    Args:
+        findings: of the experiment.
+        drawn: name -> title of its figures.
+        out: folder.
 
     Raises:
-        ResultsError: a file cannot be written.
+        OSError: a file cannot be written.
     """
-    write_table(findings, out)
-    content = record_of(findings, drawn)
-    write_whole(out / RECORD, json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
+    table = columns_of(findings)
+    record = json.dumps(record_of(findings, drawn), indent=1, ensure_ascii=False, allow_nan=False)
+    contents: dict[str, str | bytes] = {TABLE[0]: to_csv(table), TABLE[1]: _parquet(findings, table)}
+    if findings.spec.claims or findings.spec.checks:
+        contents[VERDICTS] = to_csv(verdict_columns(findings))
+    contents |= {f"{name}.csv": to_csv(columns) for name, columns in sample_columns(findings).items()}
+    for name, content in {**contents, RECORD: record + "\n"}.items():
+        write_whole(out / name, content)
 
 
 def record_of(findings: ExperimentResult, drawn: Mapping[str, str] | None = None) -> dict[str, Any]:
