@@ -357,21 +357,42 @@ def _parser() -> etree.XMLParser:
     return etree.XMLParser(resolve_entities=False, no_network=True, remove_comments=True, remove_pis=True)
 
 
+def transformation(element: _Element) -> tuple[str, _Element] | None:
+    """Return kind and element of the transformation of a connection or mapping entry, None if it has none.
+
+    Raises:
+        SspError: it has several.
+    """
+    children = [(etree.QName(child).localname, child) for child in element.iterchildren("{*}*")]
+    found = [(kind, child) for kind, child in children if kind.endswith("Transformation")]
+    if len(found) > 1:
+        raise SspError(f"more than one transformation: {listed(kind for kind, _ in found)}", found[1][1])
+    return found[0] if found else None
+
+
 def linear(element: _Element) -> tuple[float, float]:
     """Return factor and offset of the linear transformation of a connection or mapping entry.
 
     Raises:
         SspError: the transformation is of another kind, or has a malformed number.
     """
-    for child in element.iterchildren("{*}*"):
-        kind = etree.QName(child).localname
-        if kind == "LinearTransformation":
-            return number(child, "factor", 1.0), number(child, "offset", 0.0)
-        if kind.endswith("Transformation"):
-            raise SspError(
-                f"{kind} is not supported: only LinearTransformation is", child, code="ssp-unsupported"
-            )
-    return 1.0, 0.0
+    kind, found = transformation(element) or ("", element)
+    if not kind:
+        return 1.0, 0.0
+    if kind != "LinearTransformation":
+        raise SspError(f"{kind} is not supported here", found, code="ssp-unsupported")
+    return number(found, "factor", 1.0), number(found, "offset", 0.0)
+
+
+def required(element: _Element, attribute: str) -> str:
+    """Return an attribute that an element must have.
+
+    Raises:
+        SspError: it does not, or it is empty.
+    """
+    if text := element.get(attribute):
+        return str(text)
+    raise SspError(f"a {etree.QName(element).localname} has no {attribute}", element)
 
 
 def number(element: _Element, attribute: str, default: float | None = None) -> float:
