@@ -105,7 +105,7 @@ def test_messages_are_the_same_for_any_step(h):
     """Sampled at 10 ms with all there is; the signal is a straight line, which every step describes."""
 
     def messages(step: float) -> list[float]:
-        channel = Channel(ChannelSpec(21.0, 1.01, 0.3, 0.1, 0.5, 40.0, 1e-3, 0.01), 7, 0.0, 0.0)
+        channel = Channel(ChannelSpec(21.0, 1.01, 0.3, 0.1, 0.5, 40.0, 1e-3, sample_time=0.01), 7, 0.0, 0.0)
         seen = []
         for k in range(round(0.5 / step)):
             channel.advance(k * step, step, 20.0 * (k + 1) * step)
