@@ -19,15 +19,12 @@ import errno
 import hashlib
 import io
 import json
-import lzma
 import os
 import re
 import shutil
-import struct
 import sys
 import tempfile
 import zipfile
-import zlib
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
@@ -41,7 +38,7 @@ from yawbench.foundation.safe_files import PACKED, read_bytes, reason
 from . import description as fmu_description
 from .description import binary_of, platform
 from .fmu import Fmu, RunsAs
-from .zip_members import ArchiveError, members
+from .zip_members import DAMAGE, ArchiveError, members
 
 FORMAT = 12
 """Format version of cache entries; part of their names, so versions of this program can share a cache."""
@@ -49,10 +46,6 @@ FORMAT = 12
 _FILE_NAME = re.compile(r"[^/\\:\x00-\x1f\x7f]{1,200}")
 _FILE_TIME = 946_684_800
 """Time stamp of unpacked files, 2000-01-01 [s]: keeps Python's bytecode valid after a restore."""
-_DAMAGE = (
-    zipfile.BadZipFile, zlib.error, lzma.LZMAError, struct.error, EOFError, OSError, ValueError,
-    RuntimeError,  # encrypted, or an unknown compression method
-)  # fmt: skip
 
 
 def open_fmu(path: Path | str, *, validate: bool = True) -> Fmu:
@@ -155,7 +148,7 @@ def _read_member(path: Path) -> bytes:
         raise ModelDescriptionError(
             f"{path}: no such FMU: {outer} does not contain it", code="fmu-missing"
         ) from None
-    except _DAMAGE as error:
+    except DAMAGE as error:
         raise ModelDescriptionError(f"{path}: cannot read this FMU: {error}", code="fmu-damaged") from None
 
 
@@ -200,7 +193,7 @@ def _files(raw: bytes, path: Path) -> dict[str, bytes]:
             contents = {name: archive.read(info) for name, info in members(archive).items()}
     except ArchiveError as error:
         raise ModelDescriptionError(f"{path}: cannot read this FMU: {error}", code="fmu-damaged") from None
-    except _DAMAGE as error:
+    except DAMAGE as error:
         if raw[:2] != b"PK":
             raise ModelDescriptionError(
                 f"{path}: not an FMU: this is not a zip archive", code="fmu-damaged"

@@ -12,6 +12,7 @@ import hashlib
 import importlib.util
 import os
 import platform
+import re
 import shlex
 import shutil
 import struct
@@ -207,13 +208,23 @@ def compile_library(command: Sequence[str], sources: Mapping[str, bytes], *argum
             check=False,
         )
         if done.returncode != 0:
-            lines = [line for line in done.stderr.splitlines() if "error" in line or "undefined" in line]
             raise BuildError(
-                lines or [f"the C compiler failed: exit status {done.returncode}"], code="compiler-failed"
+                _reasons(done.stderr) or [f"the C compiler failed: exit status {done.returncode}"],
+                code="compiler-failed",
             )
         if done.stderr:
             print(printable(done.stderr.rstrip()), file=sys.stderr)
         return Path(temporary, "library.so").read_bytes()
+
+
+def _reasons(said: str) -> list[str]:
+    """Return the lines that say why a compiler or its linker failed."""
+    lines = [line for line in said.splitlines() if _REASON.search(line) and not line.endswith(":")]
+    return [line for line in lines if "ld returned" not in line] or lines
+
+
+_REASON = re.compile(r"\berror\b|undefined|\bld(\.\w+)?: ")
+"""What such a line has; a linker begins each of its lines with its name."""
 
 
 def cached_library(

@@ -45,15 +45,9 @@ EXPORTED void fmi2FreeInstance(fmi2Component c)
     discard(c);
 }
 
-/* A function that answers with a status: its name, parameters, and what it returns for an instance. */
-#define FMI2(name, parameters, answer)                                                                      \
-    EXPORTED fmi2Status fmi2##name parameters                                                               \
-    {                                                                                                       \
-        const char *const call = "fmi2" #name;                                                              \
-        Instance *instance = c;                                                                             \
-        (void)call;                                                                                         \
-        return instance == NULL ? fmi2Error : (fmi2Status)(answer);                                         \
-    }
+#define FMI2(name, parameters, answer) ANSWER(fmi2, name, parameters, answer)
+FUNCTIONS_OF_BOTH(fmi2, FMUstate, DeSerialize)
+
 #define VALUES(answer)                                                                                      \
     (n > 0 && (r == NULL || values == NULL) ? complain_of(instance, call, "value references or values are missing") \
                                             : (answer))
@@ -63,10 +57,7 @@ FMI2(SetupExperiment,
       fmi2Real stop),
      ((void)tolerance_defined, (void)tolerance, set_times(instance, call, start, stop_defined, stop)))
 FMI2(EnterInitializationMode, (fmi2Component c), enter_initialization(instance, call))
-FMI2(ExitInitializationMode, (fmi2Component c), exit_initialization(instance, call))
 FMI2(DoStep, (fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolean keep), ((void)keep, step(instance, call, t, h)))
-FMI2(Terminate, (fmi2Component c), end(instance, call))
-FMI2(Reset, (fmi2Component c), (begin(instance), OK))
 
 FMI2(GetReal, (fmi2Component c, const fmi2ValueReference r[], size_t n, fmi2Real values[]),
      VALUES(get_reals(instance, "Real", r, n, values)))
@@ -99,19 +90,6 @@ EXPORTED fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference r[],
 FMI2(SetString, (fmi2Component c, const fmi2ValueReference r[], size_t n, const fmi2String values[]),
      VALUES(set_others(instance, TEXTS, "String", r, n, NULL)))
 
-FMI2(GetFMUstate, (fmi2Component c, fmi2FMUstate *state), save(instance, call, state))
-FMI2(SetFMUstate, (fmi2Component c, fmi2FMUstate state), restore(instance, call, state))
-FMI2(FreeFMUstate, (fmi2Component c, fmi2FMUstate *state), free_state(state))
-FMI2(SerializedFMUstateSize, (fmi2Component c, fmi2FMUstate state, size_t *size),
-     size_of_state(instance, call, state, size))
-FMI2(SerializeFMUstate, (fmi2Component c, fmi2FMUstate state, fmi2Byte bytes[], size_t size),
-     serialize(instance, call, state, bytes, size))
-FMI2(DeSerializeFMUstate, (fmi2Component c, const fmi2Byte bytes[], size_t size, fmi2FMUstate *state),
-     deserialize(instance, call, bytes, size, state))
-
-/* Only errors are logged, and always. */
-FMI2(SetDebugLogging, (fmi2Component c, fmi2Boolean on, size_t n, const fmi2String names[]),
-     ((void)on, n == 0 || names != NULL ? OK : complain_of(instance, call, "no categories given")))
 FMI2(GetRealStatus, (fmi2Component c, const fmi2StatusKind kind, fmi2Real *value),
      value == NULL                    ? complain_of(instance, call, "no place for the value")
      : kind != fmi2LastSuccessfulTime ? complain(instance, "fmi2GetRealStatus knows of fmi2LastSuccessfulTime alone")

@@ -52,23 +52,14 @@ EXPORTED void fmi3FreeInstance(fmi3Instance c)
     discard(c);
 }
 
-#define FMI3(name, parameters, answer)                                                                      \
-    EXPORTED fmi3Status fmi3##name parameters                                                               \
-    {                                                                                                       \
-        const char *const call = "fmi3" #name;                                                              \
-        Instance *instance = c;                                                                             \
-        (void)call;                                                                                         \
-        return instance == NULL ? fmi3Error : (fmi3Status)(answer);                                         \
-    }
+#define FMI3(name, parameters, answer) ANSWER(fmi3, name, parameters, answer)
+FUNCTIONS_OF_BOTH(fmi3, FMUState, Deserialize)
 
 FMI3(EnterInitializationMode,
      (fmi3Instance c, fmi3Boolean tolerance_defined, fmi3Float64 tolerance, fmi3Float64 start, fmi3Boolean stop_defined,
       fmi3Float64 stop),
      ((void)tolerance_defined, (void)tolerance,
       set_times(instance, call, start, stop_defined, stop) == OK ? enter_initialization(instance, call) : ERROR))
-FMI3(ExitInitializationMode, (fmi3Instance c), exit_initialization(instance, call))
-FMI3(Terminate, (fmi3Instance c), end(instance, call))
-FMI3(Reset, (fmi3Instance c), (begin(instance), OK))
 
 EXPORTED fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 t, fmi3Float64 h, fmi3Boolean keep, fmi3Boolean *event,
                                fmi3Boolean *ends, fmi3Boolean *early, fmi3Float64 *reached)
@@ -157,20 +148,6 @@ GET_AND_SET(String, TEXTS, 0, "")
 FMI3_OTHER_TYPES(NO_VARIABLES)
 #undef NO_VARIABLES
 #undef GET_AND_SET
-
-FMI3(GetFMUState, (fmi3Instance c, fmi3FMUState *state), save(instance, call, state))
-FMI3(SetFMUState, (fmi3Instance c, fmi3FMUState state), restore(instance, call, state))
-FMI3(FreeFMUState, (fmi3Instance c, fmi3FMUState *state), free_state(state))
-FMI3(SerializedFMUStateSize, (fmi3Instance c, fmi3FMUState state, size_t *size),
-     size_of_state(instance, call, state, size))
-FMI3(SerializeFMUState, (fmi3Instance c, fmi3FMUState state, fmi3Byte bytes[], size_t size),
-     serialize(instance, call, state, (char *)bytes, size))
-FMI3(DeserializeFMUState, (fmi3Instance c, const fmi3Byte bytes[], size_t size, fmi3FMUState *state),
-     deserialize(instance, call, (const char *)bytes, size, state))
-
-/* Only errors are logged, and always. */
-FMI3(SetDebugLogging, (fmi3Instance c, fmi3Boolean on, size_t n, const fmi3String names[]),
-     ((void)on, n == 0 || names != NULL ? OK : complain_of(instance, call, "no categories given")))
 
 #define UNSUPPORTED(name, parameters) FMI3(name, parameters, complain(instance, "fmi3" #name " is not supported"))
 FMI3_UNSUPPORTED_FUNCTIONS(UNSUPPORTED)

@@ -623,5 +623,34 @@ static Status deserialize(Instance *instance, const char *call, const char *byte
     return OK;
 }
 
+/* ---- functions of FMI ---- */
+
+/* A function that answers with a status: version, name, parameters, and what it returns for an instance. */
+#define ANSWER(fmi, name, parameters, answer)                                                               \
+    EXPORTED fmi##Status fmi##name parameters                                                               \
+    {                                                                                                       \
+        const char *const call = #fmi #name;                                                                \
+        Instance *instance = c;                                                                             \
+        (void)call;                                                                                         \
+        return instance == NULL ? fmi##Error : (fmi##Status)(answer);                                       \
+    }
+
+/* Functions that both versions have, which spell two words in their own way. Only errors are logged, and always. */
+#define FUNCTIONS_OF_BOTH(fmi, State, Deserialize)                                                          \
+    ANSWER(fmi, ExitInitializationMode, (void *c), exit_initialization(instance, call))                     \
+    ANSWER(fmi, Terminate, (void *c), end(instance, call))                                                  \
+    ANSWER(fmi, Reset, (void *c), (begin(instance), OK))                                                    \
+    ANSWER(fmi, Get##State, (void *c, void **state), save(instance, call, state))                           \
+    ANSWER(fmi, Set##State, (void *c, void *state), restore(instance, call, state))                         \
+    ANSWER(fmi, Free##State, (void *c, void **state), free_state(state))                                    \
+    ANSWER(fmi, Serialized##State##Size, (void *c, void *state, size_t *size),                              \
+           size_of_state(instance, call, state, size))                                                      \
+    ANSWER(fmi, Serialize##State, (void *c, void *state, fmi##Byte bytes[], size_t size),                   \
+           serialize(instance, call, state, (char *)bytes, size))                                           \
+    ANSWER(fmi, Deserialize##State, (void *c, const fmi##Byte bytes[], size_t size, void **state),          \
+           deserialize(instance, call, (const char *)bytes, size, state))                                   \
+    ANSWER(fmi, SetDebugLogging, (void *c, fmi##Boolean on, size_t n, const fmi##String names[]),           \
+           ((void)on, n == 0 || names != NULL ? OK : complain_of(instance, call, "no categories given")))
+
 #include "fmi2_unit.h"
 #include "fmi3_unit.h"

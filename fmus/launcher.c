@@ -486,28 +486,16 @@ EXPORT fmi2Status fmi2Reset(fmi2Component c)
 
 /* ---- FMI: values ---- */
 
-#define GET(Type)                                                                                            \
-    EXPORT fmi2Status fmi2Get##Type(fmi2Component c, const fmi2ValueReference vr[], size_t n,                \
-                                    fmi2##Type value[])                                                      \
+#define ACCESS(Verb, Type, constant, check)                                                                  \
+    EXPORT fmi2Status fmi2##Verb##Type(fmi2Component c, const fmi2ValueReference vr[], size_t n,             \
+                                       constant fmi2##Type value[])                                          \
     {                                                                                                        \
         INSTANCE(c)                                                                                          \
         if (UNLIKELY(n == 0)) {                                                                              \
             return fmi2OK;                                                                                   \
         }                                                                                                    \
-        REQUIRE(vr != NULL && value != NULL, "fmi2Get" #Type ": value references or values are missing")     \
-        return checked(in, library.Get##Type(in->stock, vr, n, value));                                      \
-    }
-
-#define SET(Type, check)                                                                                     \
-    EXPORT fmi2Status fmi2Set##Type(fmi2Component c, const fmi2ValueReference vr[], size_t n,                \
-                                    const fmi2##Type value[])                                                \
-    {                                                                                                        \
-        INSTANCE(c)                                                                                          \
-        if (UNLIKELY(n == 0)) {                                                                              \
-            return fmi2OK;                                                                                   \
-        }                                                                                                    \
-        REQUIRE(vr != NULL && value != NULL, "fmi2Set" #Type ": value references or values are missing")     \
-        check return checked(in, library.Set##Type(in->stock, vr, n, value));                                \
+        REQUIRE(vr != NULL && value != NULL, "fmi2" #Verb #Type ": value references or values are missing")  \
+        check return checked(in, library.Verb##Type(in->stock, vr, n, value));                               \
     }
 
 static bool all_utf8(size_t n, const fmi2String value[])
@@ -520,14 +508,14 @@ static bool all_utf8(size_t n, const fmi2String value[])
     return true;
 }
 
-GET(Real)
-GET(Integer)
-GET(Boolean)
-GET(String)
-SET(Real, )
-SET(Integer, )
-SET(Boolean, )
-SET(String, REQUIRE(all_utf8(n, value), "fmi2SetString: a string is missing or not UTF-8"))
+ACCESS(Get, Real, , )
+ACCESS(Get, Integer, , )
+ACCESS(Get, Boolean, , )
+ACCESS(Get, String, , )
+ACCESS(Set, Real, const, )
+ACCESS(Set, Integer, const, )
+ACCESS(Set, Boolean, const, )
+ACCESS(Set, String, const, REQUIRE(all_utf8(n, value), "fmi2SetString: a string is missing or not UTF-8"))
 
 /* ---- FMI: state ---- */
 

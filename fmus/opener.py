@@ -31,7 +31,7 @@ from typing import TYPE_CHECKING, Literal
 
 from yawbench import fmus
 from yawbench.foundation.errors import Diagnostic, ModelDescriptionError
-from yawbench.foundation.messages import closest, listed, printable, short
+from yawbench.foundation.messages import hint, listed, printable, short
 from yawbench.vocabulary.roles import role_in
 
 from .archive import open_fmu
@@ -186,7 +186,7 @@ def find_fmu(fmu: str, *, scenario: Path, fmus: Path, opener: Opener, build: boo
         build: whether it may build this one.
 
     Raises:
-        ModelDescriptionError: no such FMU; the message lists the existing ones.
+        ModelDescriptionError: no such FMU; the message names those most like it.
         BuildError: building fails.
     """
     if is_path(fmu):
@@ -210,10 +210,8 @@ def find_fmu(fmu: str, *, scenario: Path, fmus: Path, opener: Opener, build: boo
     names = opener.names(fmus)
     role = role_in(fmu)
     related = [name for name in names if role and role_in(name) == role] or names
-    likely = closest(fmu, names)
-    guess = f"did you mean {likely!r}? " if likely else ""
     raise ModelDescriptionError(
-        f"no FMU {short(fmu)} in {fmus}; {guess}there are: {listed(related)}", code="fmu-missing"
+        f"no FMU {short(fmu)} in {fmus}{hint(fmu, related, lead='there are')}", code="fmu-missing"
     )
 
 

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import lzma
+import struct
 import zipfile
+import zlib
 from collections.abc import Iterable
 from pathlib import PurePosixPath
 
@@ -10,6 +13,13 @@ from yawbench.foundation.messages import in_bytes
 
 UNPACKED = 1_000_000_000
 """Bytes of all members of an archive, unpacked. Chosen: larger than all FMUs known to us."""
+
+
+DAMAGE = (
+    zipfile.BadZipFile, zlib.error, lzma.LZMAError, struct.error, EOFError, OSError, ValueError,
+    RuntimeError,  # encrypted, or an unknown compression method
+)  # fmt: skip
+"""What the reading of a damaged archive raises."""
 
 
 class ArchiveError(ValueError):

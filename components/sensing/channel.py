@@ -2,7 +2,7 @@
 
     low pass    x'' + sqrt(2) w x' + w^2 x = w^2 u           w = 2 pi bandwidth                  (1)
     measured    y_k = gain x(t_k) + bias + drift (t_k - t_0) + noise N_k       t_k = t_0 + k T    (2)
-    message     m_k = round(limit(y_k) / quantum) quantum                                        (3)
+    message     m_k = offset + round(limit(y_k - offset) / quantum) quantum                      (3)
     received    m_k from t_k + latency until the next message is there                            (4)
 
 A bandwidth, noise, range, quantum or latency of zero disables the effect; without a sample time T every
@@ -31,8 +31,9 @@ class ChannelSpec:
         bias: offset [unit].
         drift: rate of the bias [unit/s].
         noise: root mean square [unit].
-        range: largest magnitude [unit].
+        range: largest distance of a message from the offset [unit].
         quantum: resolution of a message [unit].
+        offset: value from which messages count [unit].
         sample_time: time between messages [s].
         latency: time from the sample to the arrival of the message [s].
     """
@@ -44,6 +45,7 @@ class ChannelSpec:
     noise: float = 0.0
     range: float = 0.0
     quantum: float = 0.0
+    offset: float = 0.0
     sample_time: float = 0.0
     latency: float = 0.0
 
@@ -54,11 +56,13 @@ class ChannelSpec:
             y += self.bias + self.drift * t
         if self.noise:
             y += self.noise * noise.normal(key, k)
+        if self.offset:
+            y -= self.offset
         if self.range:
             y = min(max(y, -self.range), self.range)
         if self.quantum:
             y = round(y / self.quantum) * self.quantum
-        return y
+        return y + self.offset if self.offset else y
 
 
 class Channel:

@@ -68,8 +68,9 @@ _FIGURES = {
     "bias": ("signal", "Bias of the {}", None),
     "drift": ("rate", "Drift of the bias of the {}", None),
     "noise": ("signal", "Noise of the {}, root mean square", 0.0),
-    "range": ("signal", "Largest magnitude measured by the {}, 0: unlimited", 0.0),
+    "range": ("signal", "Largest magnitude measured by the {}, from its offset, 0: unlimited", 0.0),
     "quantum": ("signal", "Resolution of the {}, 0: unlimited", 0.0),
+    "offset": ("signal", "Value from which messages of the {} count", None),
     "sample_time": ("s", "Time between messages of the {}, 0: that of the cluster", 0.0),
     "latency": ("s", "Latency of the {} beyond that of the cluster", 0.0),
 }

@@ -154,16 +154,19 @@ def longitudinal_force(kappa: float, curve: LongitudinalCurve) -> float:
     force = d * sin(c * atan(x - e * (x - atan(x)))) + s_v
     y = variation * kappa
     b_w /= sqrt(1.0 + y * y)
-    y = b_w * slip
-    if e_w:
-        y -= e_w * (y - atan(y))
-    weight = cos(c_w * atan(y))
-    if slip_0:
-        y = b_w * slip_0
-        if e_w:
-            y -= e_w * (y - atan(y))
-        weight /= cos(c_w * atan(y))
+    weight = _weight(slip, slip_0, b_w, c_w, e_w)
     return weight * force if weight > 0.0 else 0.0
+
+
+def _weight(slip: float, slip_0: float, b: float, c: float, e: float) -> float:
+    """Return the weight of a force under the other slip, which is 1 at `slip_0`."""
+    y = b * slip
+    if e:
+        y -= e * (y - atan(y))
+    weight = cos(c * atan(y))
+    if slip_0:
+        weight /= _weight(slip_0, 0.0, b, c, e)
+    return weight
 
 
 def wheel_forces(
@@ -227,15 +230,7 @@ def wheel_forces(
     b_w = rb1 / sqrt(1.0 + y * y)
     s_h = rh1 + rh2 * df
     e_w = re1 + re2 * df
-    y = b_w * (kappa_w + s_h)
-    if e_w:
-        y -= e_w * (y - atan(y))
-    weight = cos(rc * atan(y))
-    if s_h:
-        y = b_w * s_h
-        if e_w:
-            y -= e_w * (y - atan(y))
-        weight /= cos(rc * atan(y))
+    weight = _weight(kappa_w + s_h, s_h, b_w, rc, e_w)
     f_y = weight * f_y if weight > 0.0 else 0.0
 
     q1, q2, q3, c_t, d1, d2, e1, e2, e3, lever = axle[3]

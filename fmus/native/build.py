@@ -15,9 +15,9 @@ import platform
 import sys
 import tempfile
 from base64 import b64decode, b64encode
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -160,8 +160,8 @@ def native(
             raise Refused(f"its translation to C is too long ({len(text) / 1e6:.1f} million characters)")
         if hurry and effort is None and len(text) > MOST_IN_HURRY:
             return Native(why_not=LATER, later=True)
-        thresholds = _thresholds(program)
-        made = _let_through(text, component, guid, resources, limit, hurry, thresholds)
+        make = partial(_made, text, component, guid, resources, _thresholds(program))
+        made = _let_through(text, make, limit, hurry)
         if made.new:
             keep(EFFORTS, entry, str(_processor_time() - began).encode())
         if closed or made.why_not:
@@ -193,16 +193,8 @@ def _thresholds(program: Program) -> list[float]:
     return sorted({*constants, *map(float, parameters)})
 
 
-def _let_through(
-    text: str,
-    component: type[Any],
-    guid: str,
-    resources: Path,
-    limit: int,
-    hurry: bool,
-    thresholds: Sequence[float],
-) -> Native:
-    """Return the cached result for a C text, or compile and compare it."""
+def _let_through(text: str, make: Callable[[int], Native], limit: int, hurry: bool) -> Native:
+    """Return the cached result for a C text, or what `make` makes of it within a processor time [s]."""
     key = hashlib.sha256(f"{text}{_comparison()}{limit}".encode()).hexdigest()[:32]
     kept = recall(STORE, key)
     if kept is not None:
@@ -210,8 +202,7 @@ def _let_through(
         files = {path: b64decode(content) for path, content in record["files"].items()}
         return Native(files, record["why_not"], untried=tuple(record["untried"]))
     try:
-        most = min(limit, int(LONGEST)) if hurry else limit
-        made = _made(text, component, guid, resources, most, thresholds)
+        made = make(min(limit, int(LONGEST)) if hurry else limit)
     except TimeoutError as error:
         if hurry:
             return Native(why_not=LATER, later=True, new=True)
@@ -227,9 +218,10 @@ def _made(
     component: type[Any],
     guid: str,
     resources: Path,
-    limit: int,
     thresholds: Sequence[float],
+    limit: int,
 ) -> Native:
+    """Compile a C text, and compare it."""
     name = component.fmu_name
     sources = _sources(name, text)
     path = f"binaries/{OWN.folder}/{NATIVE_LIBRARY}"

@@ -428,11 +428,9 @@ def _range(e: Evaluator, *ends: Any) -> Any:
 
 
 def _bisect_right(e: Evaluator, values: Any, x: Any) -> Any:
-    place: ir.Operand = 0
     items = e.items.of(values)
     if not any(isinstance(y, ir.Var) for y in (*items, x)):
         return bisect.bisect_right(items, x)
-    low, high = 0, len(items)
 
     def go(low: int, high: int) -> ir.Operand:  # the search order of `bisect`
         if low == high:
@@ -441,8 +439,7 @@ def _bisect_right(e: Evaluator, values: Any, x: Any) -> Any:
         less = e.lower.compare("<", x, items[middle])
         return e.paths.branch(less, lambda: go(low, middle), lambda: go(middle + 1, high))  # type: ignore
 
-    place = go(low, high)
-    return place
+    return go(0, len(items))
 
 
 def _isinstance(e: Evaluator, value: Any, kinds: Any) -> Any:

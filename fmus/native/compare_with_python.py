@@ -40,7 +40,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
-from ..usual_ranges import usual_range
+from ..usual_ranges import pattern_of, usual_range
 from .ir import ALONE
 
 STEPS = 2000
@@ -56,15 +56,19 @@ EXTREME = (math.nan, math.inf, -math.inf, 1e300, -0.0)
 """Values of each input that are compared."""
 LIMIT = 240
 """Largest processor time [s] of a comparison, since a wrongly translated loop may never end."""
-SEARCH, EPISODE, LONGEST_EPISODE = 120_000, 150, 50_000
+SEARCH, EPISODE, LONGEST_EPISODE = 240_000, 150, 50_000
 """Steps of the search for branches that were not reached, of one try, and at most of one; chosen: the search
-takes half a second, as long as the comparison, and a controller is followed for 50,000 samples."""
-PATIENCE = 100
-"""Tries in a row that reach nothing new, after which the search ends; chosen: a tenth of a second."""
+takes a second, twice as long as the comparison, and a controller is followed for 50,000 samples."""
+PATIENCE = 200
+"""Tries in a row that reach nothing new, after which the search ends; chosen: two tenths of a second."""
 SEARCH_SECONDS = 5
 """Processor time [s] after which a search is given up: with odd parameters a unit may sample without end."""
-MOST_FOUND = 15
+MOST_FOUND = 30
 """Largest number of tries that are compared; chosen: a start of the slowest component takes half a second."""
+TOGETHER = 0.5
+"""Share of the turns of an input in which those of the other wheels turn with it, in half of the tries."""
+OFF = (0.05, 0.3, 1.0)
+"""Shares of the parameters that are switched off, in half of the tries."""
 AFTER = 60
 """Steps of a comparison after the last new branch was reached, in which what the branch did shows."""
 _LOGGER = CFUNCTYPE(None, c_void_p, c_char_p, c_int, c_char_p, c_char_p)
@@ -105,6 +109,7 @@ class Native:
     """Instance of a native library, called by the functions of FMI 2.0."""
 
     fmi = 2
+    _STATE, _DESERIALIZE = "FMUstate", "DeSerialize"
 
     def __init__(self, library: Path, guid: str) -> None:
         self.library = ctypes.CDLL(str(library))
@@ -128,8 +133,11 @@ class Native:
         messages, self.messages = self.messages, []
         return status == 0, messages, values
 
+    def _function(self, name: str) -> Any:
+        return getattr(self.library, f"fmi{self.fmi}{name}")
+
     def reset(self) -> Answer:
-        return self._answer(self.library.fmi2Reset(self.instance))
+        return self._answer(self._function("Reset")(self.instance))
 
     def set(self, kind: str, refs: Sequence[int], values: Sequence[Any]) -> Answer:
         type = c_double if kind == "Real" else c_int
@@ -150,7 +158,7 @@ class Native:
         return self._answer(status)
 
     def end_initialization(self) -> Answer:
-        return self._answer(self.library.fmi2ExitInitializationMode(self.instance))
+        return self._answer(self._function("ExitInitializationMode")(self.instance))
 
     def step(self, t: float, h: float) -> Answer:
         return self._answer(self.library.fmi2DoStep(self.instance, c_double(t), c_double(h), c_int(1)))
@@ -158,20 +166,21 @@ class Native:
     def save(self) -> bytes:
         """Return the serialized state."""
         state, size = c_void_p(), c_size_t()
-        self.library.fmi2GetFMUstate(self.instance, byref(state))
-        self.library.fmi2SerializedFMUstateSize(self.instance, state, byref(size))
+        self._function(f"Get{self._STATE}")(self.instance, byref(state))
+        self._function(f"Serialized{self._STATE}Size")(self.instance, state, byref(size))
         content = ctypes.create_string_buffer(size.value)
-        self.library.fmi2SerializeFMUstate(self.instance, state, content, size)
-        self.library.fmi2FreeFMUstate(self.instance, byref(state))
+        self._function(f"Serialize{self._STATE}")(self.instance, state, content, size)
+        self._function(f"Free{self._STATE}")(self.instance, byref(state))
         return content.raw
 
     def restore(self, content: bytes) -> Answer:
         state = c_void_p()
         size = c_size_t(len(content))
-        status = self.library.fmi2DeSerializeFMUstate(self.instance, content, size, byref(state))
+        deserialize = self._function(f"{self._DESERIALIZE}{self._STATE}")
+        status = deserialize(self.instance, content, size, byref(state))
         if status == 0:
-            status = self.library.fmi2SetFMUstate(self.instance, state)
-            self.library.fmi2FreeFMUstate(self.instance, byref(state))
+            status = self._function(f"Set{self._STATE}")(self.instance, state)
+            self._function(f"Free{self._STATE}")(self.instance, byref(state))
         return self._answer(status)
 
 
@@ -179,6 +188,7 @@ class Native3(Native):
     """Instance of a native library, called by the functions of FMI 3.0."""
 
     fmi = 3
+    _STATE, _DESERIALIZE = "FMUState", "Deserialize"
     _TYPES: ClassVar[dict[str, tuple[str, Any]]] = {
         "Real": ("Float64", c_double),
         "Integer": ("Int32", c_int),
@@ -199,9 +209,6 @@ class Native3(Native):
     def _log_3(self, environment: Any, status: int, category: bytes, text: bytes) -> None:
         self.messages.append(text.decode("utf-8", "replace"))
 
-    def reset(self) -> Answer:
-        return self._answer(self.library.fmi3Reset(self.instance))
-
     def set(self, kind: str, refs: Sequence[int], values: Sequence[Any]) -> Answer:
         name, type = self._TYPES[kind]
         n = len(refs)
@@ -219,32 +226,11 @@ class Native3(Native):
         enter = self.library.fmi3EnterInitializationMode
         return self._answer(enter(self.instance, no, nothing, c_double(t), no, nothing))
 
-    def end_initialization(self) -> Answer:
-        return self._answer(self.library.fmi3ExitInitializationMode(self.instance))
-
     def step(self, t: float, h: float) -> Answer:
         flags, reached = [c_bool() for _ in range(3)], c_double()
         step = self.library.fmi3DoStep
         done = step(self.instance, c_double(t), c_double(h), c_bool(True), *map(byref, flags), byref(reached))
         return self._answer(done)
-
-    def save(self) -> bytes:
-        state, size = c_void_p(), c_size_t()
-        self.library.fmi3GetFMUState(self.instance, byref(state))
-        self.library.fmi3SerializedFMUStateSize(self.instance, state, byref(size))
-        content = ctypes.create_string_buffer(size.value)
-        self.library.fmi3SerializeFMUState(self.instance, state, content, size)
-        self.library.fmi3FreeFMUState(self.instance, byref(state))
-        return content.raw
-
-    def restore(self, content: bytes) -> Answer:
-        state = c_void_p()
-        size = c_size_t(len(content))
-        status = self.library.fmi3DeserializeFMUState(self.instance, content, size, byref(state))
-        if status == 0:
-            status = self.library.fmi3SetFMUState(self.instance, state)
-            self.library.fmi3FreeFMUState(self.instance, byref(state))
-        return self._answer(status)
 
 
 class Branches:
@@ -479,13 +465,21 @@ def _shown(args: Sequence[Any]) -> str:
     return f"({text[:80]}...)" if len(text) > 80 else f"({text})"
 
 
-def random_inputs(variables: Sequence[Any], seed: str, near: Sequence[float] = ()) -> Iterator[list[float]]:
+def random_inputs(
+    variables: Sequence[Any], seed: str, near: Sequence[float] = (), together: float = 0.0
+) -> Iterator[list[float]]:
     """Yield inputs endlessly: random walks, jumps and constants in usual, smaller and larger ranges.
 
-    With `near`, also these numbers, those of other inputs, and far larger and smaller ones.
+    Args:
+        variables: of the component.
+        seed: of the numbers drawn.
+        near: values that are given too, with those of other inputs, and far larger and smaller ones.
+        together: share of the turns of an input in which the same signal of the other wheels does the same.
     """
     chance = random.Random(seed)
-    ranges = [usual_range(v.name) for v in variables if v.causality == "input"]
+    names = [v.name for v in variables if v.causality == "input"]
+    ranges = list(map(usual_range, names))
+    alike = [[k for k, other in enumerate(names) if pattern_of(other) == pattern_of(x)] for x in names]
     now, half, modes = [0.5 * (low + high) for low, high in ranges], [0.0] * len(ranges), [""] * len(ranges)
     turn = chance.choice((0.02, 0.1, 0.5)) if near else 0.01
     while True:
@@ -504,6 +498,8 @@ def random_inputs(variables: Sequence[Any], seed: str, near: Sequence[float] = (
                     now[i] = middle + half[i] * chance.uniform(-1.0, 1.0)
                 elif modes[i] in ("near", "same"):
                     now[i] = chance.choice(near if modes[i] == "near" else now)
+                for k in alike[i] if together and chance.random() < together else ():
+                    modes[k], half[k], now[k] = modes[i], half[i], now[i]
             if modes[i] == "walk":
                 moved = now[i] + half[i] * chance.gauss(0.0, 0.05)
                 now[i] = min(max(moved, middle - half[i]), middle + half[i])
@@ -585,28 +581,39 @@ class Cases:
         return moved
 
     def searched(self) -> Iterator[Case]:
-        """Yield cases with inputs of all kinds, endlessly; every text of a choice is chosen in turn."""
+        """Yield cases with inputs of all kinds, endlessly; every text of a choice is chosen in turn.
+
+        In every second case parameters are switched off, and wheels do the same.
+        """
         for number in itertools.count():
             chance = random.Random(f"{self.name} {number}")
             turn, odd = divmod(number, 2)
             long = self.counts[turn] + AFTER if not odd and turn < len(self.counts) else EPISODE
             yield self._wild(f"found by searching, {number + 1}", number, chance, long)
+            chance = random.Random(f"{self.name} {number}, off")
+            yield self._wild(f"found by switching off, {number + 1}", number, chance, EPISODE, off=True)
 
-    def _wild(self, label: str, number: int, chance: random.Random, count: int) -> Case:
+    def _wild(self, label: str, number: int, chance: random.Random, count: int, *, off: bool = False) -> Case:
         moved = chance.sample(self.parameters, min(len(self.parameters), chance.choice((0, 1, 2, 4))))
         settings = [(v.fmi_type, i, self._value(v, chance)) for i, v in moved]
         settings += [("Enumeration", i, 1 + number % len(v.choices)) for i, v in self.parameters if v.choices]
         if chance.random() < 0.5:  # what is off by default is switched on
             size = [chance.choice((1.0, -1.0)) * 10.0 ** chance.uniform(-2.0, 4.0) for _ in self.parameters]
-            off = [(i, v, x) for (i, v), x in zip(self.parameters, size, strict=True) if v.type == "Real"]
+            reals = [(i, v, x) for (i, v), x in zip(self.parameters, size, strict=True) if v.type == "Real"]
             settings += [
-                ("Real", i, _within(v, x)) for i, v, x in off if v.start == 0.0 and chance.random() < 0.6
+                ("Real", i, _within(v, x)) for i, v, x in reals if v.start == 0.0 and chance.random() < 0.6
             ]
+        share = chance.choice(OFF) if off else 0.0
+        settings += [
+            ("Real", i, _within(v, 0.0))
+            for i, v in self.parameters
+            if off and v.type == "Real" and chance.random() < share
+        ]
         h = chance.choice((*LENGTHS, *LENGTHS, 1e-4, 0.1))
         times = [*self.near, *(float(x) for kind, _, x in settings if kind in ("Real", "Integer"))]
         start = chance.choice((0.0, 0.0, *STARTS, *[x - 10.3 * h for x in times if 0.0 < x < 1e6]))
         short = [1e-9, 0.37 * h, *(x for x in self.near if 0.0 < x < 1.0)]  # at events and at the end
-        inputs = random_inputs(self.variables, f"{self.name} {number}", self.near)
+        inputs = random_inputs(self.variables, f"{self.name} {number}", self.near, TOGETHER * off)
         steps = [(next(inputs), chance.choice(short) if chance.random() < 0.03 else h) for _ in range(count)]
         return Case(label, settings, start, steps, wild=True)
 

@@ -244,7 +244,7 @@ def _passed(
             if not same(before, slots[key]):
                 starts.setdefault((box, key), before)
                 ends[box, key] = slots[key]
-        if isinstance(slots, list) and len(slots) != len(box.slots) and not path.dead:
+        if isinstance(slots, list) and len(slots) != len(box.slots):
             raise Refused("a list whose length changes in a loop")
         if isinstance(box, v.Dict) and list(slots) != list(box.slots):
             raise Refused("a dictionary whose keys change in a loop")

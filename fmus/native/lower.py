@@ -118,6 +118,10 @@ class Facts:
         return None
 
 
+def _at_most_zero(a: ir.Operand) -> bool:
+    return not isinstance(a, ir.Var) and a <= 0
+
+
 def _in_double(a: ir.Operand) -> ir.Operand:
     if ir.type_of(a) not in (ir.WORD, ir.WIDE):
         return a
@@ -135,6 +139,7 @@ class Lowering:
         self.facts = Facts()
         self.ranges: dict[ir.Var, tuple[int, int]] = {}  # least and largest value of integers
         self.choices: dict[ir.Var, tuple[ir.Operand, int, int]] = {}  # between constants: test, then, else
+        self.positive: set[ir.Var] = set()  # finite, too
         self._count = 0
 
     def new(self, type: str) -> ir.Var:
@@ -268,6 +273,8 @@ class Lowering:
         a, b = self.settled(a, self.facts), self.settled(b, self.facts)
         if not isinstance(a, ir.Var) and not isinstance(b, ir.Var):
             return bool(OPERATORS[op](a, b))
+        if (a in self.positive and _at_most_zero(b)) or (b in self.positive and _at_most_zero(a)):
+            return bool(OPERATORS[op](*(1 if isinstance(x, ir.Var) else x for x in (a, b))))
         kinds = {ir.type_of(a), ir.type_of(b)}
         if kinds & {ir.WORD, ir.WIDE} and kinds != {ir.WORD}:
             a, b = _in_double(a), _in_double(b)

@@ -265,6 +265,7 @@ class _Specialising:
         evaluator = Evaluator(UNDERSTOOD, call, self.sources, fixed, self.libraries[method == "configure"])
         evaluator.lower.facts.domains |= self.domains
         evaluator.paths.choosers |= set(self.domains)
+        evaluator.lower.positive.add(self.h)  # or the step is refused: may_step of calling_sequence.h
         try:
             self.returned = evaluator.call(evaluator.attributes.of(me, method), list(args), {})
         except Unreachable:

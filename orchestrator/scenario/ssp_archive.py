@@ -19,7 +19,6 @@ import io
 import math
 import posixpath
 import zipfile
-import zlib
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -30,7 +29,7 @@ from lxml import etree
 from lxml.etree import _Element
 
 from yawbench.fmus.fmu import Causality, UnitDefinition, element_names
-from yawbench.fmus.zip_members import ArchiveError, members, misplaced
+from yawbench.fmus.zip_members import DAMAGE, ArchiveError, members, misplaced
 from yawbench.foundation.errors import Diagnostic, Location
 from yawbench.foundation.messages import listed, short
 from yawbench.foundation.safe_files import PACKED, read_bytes, reason
@@ -67,8 +66,6 @@ LARGEST_ARRAY = 100_000
 """Largest number of elements of an array; chosen: more than any interface has."""
 LARGEST = 100_000_000
 """Maximum bytes of an unpacked description. Chosen: a thousand times the size of ours."""
-
-_DAMAGE = (zipfile.BadZipFile, zlib.error, EOFError, ValueError, RuntimeError, NotImplementedError)
 
 
 class SspError(Exception):
@@ -140,7 +137,7 @@ class SspArchive:
             self._members = members(self._archive)
         except ArchiveError as error:
             raise SspError(f"cannot read this {what}: {error}", code="file-unreadable") from None
-        except _DAMAGE as error:
+        except DAMAGE as error:
             raise SspError(f"no {what}, or damaged: {error}") from None
 
     def _has(self, member: str) -> bool:
@@ -204,7 +201,7 @@ class SspArchive:
             root = etree.fromstring(self._read(member, LARGEST), _parser(), base_url=member)
         except etree.XMLSyntaxError as error:
             raise SspError(f"{member} is not well-formed: {error.msg}") from None
-        except (OSError, *_DAMAGE) as error:
+        except DAMAGE as error:
             raise SspError(f"{member} cannot be read: {error}") from None
         if root.tag != tag:
             raise SspError(f"{member} is not a {etree.QName(tag).localname} of SSP 1.0 or 2.0")
@@ -257,7 +254,7 @@ class SspArchive:
                 with zipfile.ZipFile(io.BytesIO(self._read(member, PACKED))) as fmu:
                     content = fmu.read(members(fmu)["modelDescription.xml"])
                     description = etree.fromstring(content, _parser())
-            except (KeyError, OSError, *_DAMAGE, etree.XMLSyntaxError):
+            except (KeyError, *DAMAGE, etree.XMLSyntaxError):
                 description = etree.Element("none")
             self._variables[member] = dict(_declared(description))
         return self._variables[member]
@@ -357,21 +354,42 @@ def _parser() -> etree.XMLParser:
     return etree.XMLParser(resolve_entities=False, no_network=True, remove_comments=True, remove_pis=True)
 
 
+def transformation(element: _Element) -> tuple[str, _Element] | None:
+    """Return kind and element of the transformation of a connection or mapping entry, None if it has none.
+
+    Raises:
+        SspError: it has several.
+    """
+    children = [(etree.QName(child).localname, child) for child in element.iterchildren("{*}*")]
+    found = [(kind, child) for kind, child in children if kind.endswith("Transformation")]
+    if len(found) > 1:
+        raise SspError(f"more than one transformation: {listed(kind for kind, _ in found)}", found[1][1])
+    return found[0] if found else None
+
+
 def linear(element: _Element) -> tuple[float, float]:
     """Return factor and offset of the linear transformation of a connection or mapping entry.
 
     Raises:
         SspError: the transformation is of another kind, or has a malformed number.
     """
-    for child in element.iterchildren("{*}*"):
-        kind = etree.QName(child).localname
-        if kind == "LinearTransformation":
-            return number(child, "factor", 1.0), number(child, "offset", 0.0)
-        if kind.endswith("Transformation"):
-            raise SspError(
-                f"{kind} is not supported: only LinearTransformation is", child, code="ssp-unsupported"
-            )
-    return 1.0, 0.0
+    kind, found = transformation(element) or ("", element)
+    if not kind:
+        return 1.0, 0.0
+    if kind != "LinearTransformation":
+        raise SspError(f"{kind} is not supported here", found, code="ssp-unsupported")
+    return number(found, "factor", 1.0), number(found, "offset", 0.0)
+
+
+def required(element: _Element, attribute: str) -> str:
+    """Return an attribute that an element must have.
+
+    Raises:
+        SspError: it does not, or it is empty.
+    """
+    if text := element.get(attribute):
+        return str(text)
+    raise SspError(f"a {etree.QName(element).localname} has no {attribute}", element)
 
 
 def number(element: _Element, attribute: str, default: float | None = None) -> float:

@@ -57,6 +57,8 @@ from .ssp_archive import (
     linear,
     number,
     read_structure,
+    required,
+    transformation,
     unit_definitions,
 )
 from .yaml_lines import Document
@@ -430,7 +432,7 @@ def _bound(archive: SspArchive, element: _Element, unmapped: list[str]) -> Itera
         definitions = unit_definitions(values.iterfind(f"{{{SSV}}}Units/*"))
         names: set[str] = set()
         for parameter in values.iterfind(f"{{{SSV}}}Parameters/{{{SSV}}}Parameter"):
-            name = binding.get("prefix", "") + parameter.get("name", "")
+            name = binding.get("prefix", "") + required(parameter, "name")
             if name in names:
                 raise SspError(f"parameter {parameter.get('name')!r} is given twice in one set", parameter)
             names.add(name)
@@ -439,7 +441,7 @@ def _bound(archive: SspArchive, element: _Element, unmapped: list[str]) -> Itera
             if mapping is None:
                 yield name, (given, sizes)
             for entry in (mapping or {}).get(name, ()):
-                yield entry.get("target", ""), ([_transformed(value, entry) for value in given], sizes)
+                yield required(entry, "target"), ([_transformed(value, entry) for value in given], sizes)
         unmapped += [name for name in mapping or () if name not in names]
 
 
@@ -453,8 +455,8 @@ def _mapping(archive: SspArchive, binding: _Element) -> dict[str, list[_Element]
     entries: dict[str, list[_Element]] = {}
     targets: set[str] = set()
     for entry in content.iterfind(f"{{{SSM}}}MappingEntry"):
-        entries.setdefault(entry.get("source", ""), []).append(entry)
-        if (target := entry.get("target", "")) in targets:
+        entries.setdefault(required(entry, "source"), []).append(entry)
+        if (target := required(entry, "target")) in targets:
             raise SspError(f"two parameters are mapped to {target!r}", entry)
         targets.add(target)
     return entries
@@ -464,10 +466,9 @@ def _transformed(value: SspValue, entry: _Element) -> SspValue:
     """Return a value with the transformation of a mapping entry."""
     if _suppresses(entry):
         value = replace(value, unit=None)
-    for child in entry.iterchildren("{*}*"):
-        kind = etree.QName(child).localname
-        if kind in TABLES:
-            return replace(value, value=_looked_up(value, child, TABLES[kind]))
+    kind, found = transformation(entry) or ("", entry)
+    if kind in TABLES:
+        return replace(value, value=_looked_up(value, found, TABLES[kind]))
     factor, offset = linear(entry)
     return replace(value, factor=factor, offset=offset)
 
@@ -488,7 +489,9 @@ def _looked_up(value: SspValue, table: _Element, kind: str) -> Value:
         )
     found: dict[Value, Value] = {}
     for entry in table.iterchildren(f"{{{SSC}}}MapEntry"):
-        source, target = (_plain(kind, entry.get(key, ""), value.name, entry) for key in ("source", "target"))
+        source, target = (
+            _plain(kind, required(entry, key), value.name, entry) for key in ("source", "target")
+        )
         if found.setdefault(source, target) != target:
             raise SspError(f"{value.name}: the table of values has {entry.get('source')} twice", entry)
     return found.get(value.value, value.value)

@@ -74,6 +74,13 @@ def test_values_end_at_the_range(channel):
 
 
 @every_channel
+def test_steps_and_range_count_from_the_offset(channel):
+    _, y = received(channel, lambda t: 5 * sin(2 * pi * t), until=1.0, quantum=0.01, offset=1.003, range=2.0)
+    assert (min(y), max(y)) == pytest.approx((-0.997, 3.003))
+    assert all(abs((x - 1.003) / 0.01 - round((x - 1.003) / 0.01)) < 1e-9 for x in y)
+
+
+@every_channel
 @pytest.mark.sampled(6)
 @pytest.mark.parametrize(("frequency", "gain"), [(2.1, 1.0), (21.0, 1 / sqrt(2)), (63.0, 1 / sqrt(82))])
 def test_the_low_pass_has_minus_3_db_at_its_bandwidth_and_40_db_per_decade(channel, frequency, gain):
@@ -105,7 +112,7 @@ def test_messages_are_the_same_for_any_step(h):
     """Sampled at 10 ms with all there is; the signal is a straight line, which every step describes."""
 
     def messages(step: float) -> list[float]:
-        channel = Channel(ChannelSpec(21.0, 1.01, 0.3, 0.1, 0.5, 40.0, 1e-3, 0.01), 7, 0.0, 0.0)
+        channel = Channel(ChannelSpec(21.0, 1.01, 0.3, 0.1, 0.5, 40.0, 1e-3, sample_time=0.01), 7, 0.0, 0.0)
         seen = []
         for k in range(round(0.5 / step)):
             channel.advance(k * step, step, 20.0 * (k + 1) * step)

@@ -16,9 +16,9 @@ from yawbench.commands.new import begin
 from yawbench.fmus import recipe
 from yawbench.fmus.build import HERE as FMUS
 from yawbench.fmus.build import build_all, build_component
-from yawbench.fmus.build_stamp import read_stamp
+from yawbench.fmus.build_stamp import Edition, read_stamp
 from yawbench.fmus.c import c_recipe
-from yawbench.fmus.compiler import MINGW
+from yawbench.fmus.compiler import MINGW, TO_WINDOWS, compile_library
 from yawbench.foundation.errors import BuildError
 
 pytestmark = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler")
@@ -84,6 +84,11 @@ def test_only_what_has_changed_is_built_again(root, folder, tmp_path):
     assert build_all(tmp_path / "out", root=root).current == ["controller_idea"]
     edited(folder / "idea.c", "s->x = 0.0", "s->x = 0.5")
     assert build_all(tmp_path / "out", root=root).built == ["controller_idea"]
+
+
+def test_a_library_that_the_linker_does_not_find_is_named():
+    with refused(BuildError, "compiler-failed", names=("-lnowhere",)):
+        compile_library(["cc"], {"a.c": b"int a;"}, "-shared", "-fPIC", "a.c", "-lnowhere")
 
 
 def test_an_fmu_whose_sources_are_broken_stays_and_one_whose_sources_are_gone_is_removed(
@@ -224,6 +229,9 @@ def test_a_unit_in_c_gets_a_library_for_windows_where_a_compiler_makes_one(tmp_p
 
 
 @in_windows
-def test_the_library_for_windows_steps_as_the_one_for_linux(fmu, tmp_path, wine_prefix):
+def test_the_library_for_windows_steps_as_the_one_for_linux(unpack, tmp_path, wine_prefix):
+    edition = Edition(platforms=(TO_WINDOWS.name,))
+    archive = build_component(begun(tmp_path) / "controllers" / "idea", tmp_path / "out", edition=edition)
+    fmu = Fmu(unpack(archive))
     inputs = {"yaw_rate_ref": 0.1, "yaw_rate": 0.02}
     assert in_wine([(fmu, inputs)], tmp_path, wine_prefix) == [ten_steps(fmu, inputs)]

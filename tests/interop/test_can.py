@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import yawbench as yb
 from tests.cars import make_plan
 from tests.changed import changed
 from tests.command_line import status_of
@@ -36,7 +37,7 @@ BU_: SENSORS ESP
 BO_ 416 Inertial: 8 SENSORS
  SG_ YawRate : 0|16@1- (0.005,0) [-160|160] "deg/s" ESP
  SG_ LateralAcceleration : 16|16@1- (0.00127465,0) [-0.1|0.1] "g" ESP
- SG_ Shifted : 32|16@1+ (0.01,0.003) [0|0] "m/s2" ESP
+ SG_ Shifted : 32|16@1+ (0.002,-65.5357) [0|0] "m/s2" ESP
  SG_ Biased : 48|16@1+ (0.01,-327.68) [0|0] "m/s^2" ESP
 BO_ 417 Wheels: 4 SENSORS
  SG_ FrontLeft : 0|16@1+ (0.01,0) [0|300] "km/h" ESP
@@ -52,8 +53,9 @@ CHANNELS = {
     "yaw_rate": "Inertial.YawRate",
     "acceleration_y": "Inertial.LateralAcceleration",
     "wheel_speed": "Wheels.FrontLeft",
+    "acceleration_x": "Inertial.Shifted",
 }
-SI = {"deg/s": math.pi / 180, "g": 9.80665, "km/h": 1 / 3.6 / RADIUS}
+SI = {"m/s2": 1.0, "deg/s": math.pi / 180, "g": 9.80665, "km/h": 1 / 3.6 / RADIUS}
 
 
 @pytest.fixture
@@ -94,8 +96,9 @@ def test_every_message_of_a_run_is_what_the_network_carries(dbc, run):
         truth, seen = results[true][::every], results[measured][::every]
         assert np.ptp(truth) > 5 * about.scale * SI[about.unit]
         for value, sent in zip(truth / SI[about.unit], seen / SI[about.unit], strict=True):
-            value = min(max(value, about.minimum), about.maximum)
-            saturated += value in (about.minimum, about.maximum)
+            if about.minimum is not None:
+                value = min(max(value, about.minimum), about.maximum)
+                saturated += value in (about.minimum, about.maximum)
             others = {other.name: other.offset for other in message.signals}
             data = message.encode({**others, signal: value}, strict=False)
             decoded = message.decode(data)[signal]
@@ -127,6 +130,18 @@ def test_a_log_of_a_run_is_a_recording_of_its_messages(dbc, run, tmp_path, capsy
     with pytest.raises(ValueError, match="no column") as caught:
         file.column("YawRat", "time")
     assert mentions(str(caught.value), "'YawRate'")
+
+
+@pytest.mark.parametrize("ending", ["blf", "asc"])
+def test_a_log_is_a_recording_of_a_measured_car(dbc, run, tmp_path, ending):
+    pytest.importorskip("can")
+    pairs = {"yaw_rate": "Inertial.YawRate", "acceleration_y": "Inertial.LateralAcceleration"}
+    write_log(run, dbc, {f"sensor.{k}": v for k, v in pairs.items()}, tmp_path / f"run.{ending}")
+    signals = "".join(f"  {k}: {v.partition('.')[2]}\n" for k, v in pairs.items())
+    (tmp_path / "car.yaml").write_text(f"files: [run.{ending}]\nsignals:\n{signals}")
+    drive = yb.measured(tmp_path / "car.yaml")
+    for signal in pairs:
+        assert drive[signal] == pytest.approx(run[f"sensor.{signal}"][::4], abs=1e-9)
 
 
 def test_a_log_is_a_time_series_of_an_input(dbc, run, tmp_path):
@@ -185,9 +200,11 @@ def test_resolution_range_cycle_and_frame_of_a_signal(dbc):
         "yaw_rate_sample_time": 0.01,
         "yaw_rate_latency": 135 / 500e3,  # the longest frame with an 11-bit identifier
         "brake_pressure_quantum": 1e4,
-        "brake_pressure_range": 4095e4,  # all of its 12 bits
+        "brake_pressure_offset": 2047e4,  # the middle of its 12 bits
+        "brake_pressure_range": 2047e4,
         "brake_pressure_latency": 100 / 500e3,  # two bytes, 29-bit identifier
         "acceleration_x_quantum": 0.01,
+        "acceleration_x_offset": -0.01,
         "acceleration_x_range": 327.67,
         "acceleration_x_sample_time": 0.01,
         "acceleration_x_latency": 135 / 500e3,
@@ -201,7 +218,6 @@ def test_resolution_range_cycle_and_frame_of_a_signal(dbc):
         ({"yaw_rate": "Inertial.YawRat"}, ("'Inertial.YawRat'", "'Inertial.YawRate'")),
         ({"yaw_rate": "Inertial.LateralAcceleration"}, ("'g'", "rad/s")),
         ({"wheel_speed": "Wheels.FrontLeft"}, ("'km/h'", "rad/s", "radius")),
-        ({"acceleration_x": "Inertial.Shifted"}, ("offset", "0.003", "0.01")),
     ],
 )
 def test_a_signal_that_does_not_fit_is_refused(dbc, channels, names):

@@ -189,6 +189,12 @@ def test_a_value_that_means_nothing_is_refused_by_name(name, inner, says, tmp_pa
     assert says in str(error)
 
 
+def test_a_parameter_without_a_name_is_refused(tmp_path):
+    make_fmu(tmp_path / "g.fmu", outputs=["y"], parameters=FMI2.values())
+    nameless = parameters('<ssv:Parameter><ssv:Real value="1"/></ssv:Parameter>')
+    assert "name" in str(problem(pack(tmp_path, description(inline(nameless)))))
+
+
 def test_a_parameter_that_a_set_gives_twice_is_refused(tmp_path):
     make_fmu(tmp_path / "g.fmu", outputs=["y"], parameters=FMI2.values())
     twice = "".join(parameter("g.k", f'<ssv:Real value="{i}"/>') for i in (1, 2))
@@ -273,6 +279,9 @@ def test_a_mapping_replaces_values(name, inner, transformation, value, tmp_path)
         ([entry("given", "g.k", table("Integer", _3="x"))], "Integer"),
         ([entry("given", "g.k", "<ssc:OtherTransformation/>")], "OtherTransformation"),
         ([entry("given", "g.k"), entry("other", "g.k")], "g.k"),
+        ([entry("given", "g.k", 2 * '<ssc:LinearTransformation factor="2"/>')], "more than one"),
+        ([entry("given", "")], "target"),
+        ([entry("", "g.k")], "source"),
     ],
 )
 def test_a_mapping_that_means_nothing_is_refused(entries, says, tmp_path):

@@ -1,8 +1,9 @@
 """Sensors whose messages carry the numbers of a CAN network, as its DBC file describes them.
 
 A signal in a frame is a whole number, physical value = scale n + offset, sent every cycle. So it is a channel
-of a sensor (`components.sensing.channel`) with this scale as its quantum, the largest number as its range,
-the cycle as its time between messages, and the time that the frame takes on the bus as its latency:
+of a sensor (`components.sensing.channel`) with this scale as its quantum, the number in the middle as its
+offset, the numbers on either side as its range, the cycle as its time between messages, and the time that the
+frame takes on the bus as its latency:
 
     C = (55 + 10 s) / bit rate        s bytes of data, 11-bit identifier                       (1)
     C = (80 + 10 s) / bit rate        29-bit identifier                                        (2)
@@ -137,23 +138,18 @@ def sensor_parameters(
             raise _wrong(f"{channel}={name}", f"{error}{more}") from None
         if rolling:
             gain /= wheel_radius  # type: ignore[operator]
-        steps = signal.offset / signal.scale
-        if shift or (signal.whole and abs(steps - round(steps)) > ROUNDING):
-            sentence = f"its offset, {signal.offset:g}, is no multiple of its scale, {signal.scale:g}"
-            raise _wrong(f"{channel}={name}", f"{sentence}: a sensor rounds to multiples")
         if signal.whole:
+            first, last = (round((x - signal.offset) / signal.scale) for x in (signal.least, signal.largest))
+            middle = int((first + last) / 2)  # of two the one nearer to zero, which then is in reach
             parameters[f"{channel}_quantum"] = signal.scale * gain
-            extent = signal.largest if signal.least >= 0 else min(-signal.least, signal.largest)
-            parameters[f"{channel}_range"] = extent * gain
+            if offset := (signal.scale * middle + signal.offset) * gain + shift:
+                parameters[f"{channel}_offset"] = offset
+            parameters[f"{channel}_range"] = min(middle - first, last - middle) * signal.scale * gain
         if signal.cycle:
             parameters[f"{channel}_sample_time"] = signal.cycle
         if bit_rate is not None:
             parameters[f"{channel}_latency"] = (BITS[signal.extended] + 10 * signal.size) / bit_rate
     return parameters
-
-
-ROUNDING = 1e-9
-"""Fraction of a quantum up to which an offset is a multiple of it; chosen: decimals in a file are rounded."""
 
 
 def _wrong(where: str, sentence: str) -> ScenarioError:
