@@ -24,6 +24,7 @@ from yawbench.foundation.errors import ResultsError
 from yawbench.measurements.measured_results import MeasuredResults
 from yawbench.orchestrator.results.reader import Results
 from yawbench.orchestrator.results.run_record import ConnectionRecord, RunRecord
+from yawbench.reports import viewer as viewer_module
 from yawbench.reports.page_parts import without_comments
 from yawbench.reports.viewer import MOST, Settings, answer_of, page, still_of, viewer
 from yawbench.reports.viewer_data import pack
@@ -100,6 +101,9 @@ def test_beyond_the_largest_size_the_signals_of_the_views_and_the_road_remain():
     assert {"plant.sideslip", "plant.position_x"} <= set(fewer["columns"]) <= set(few) - of_tyres
     assert not any("tyre" in note for note in fewer["notes"])
     assert data_of(*runs, settings=Settings([view], largest=10))["partial"]
+    least = data_of(*runs, settings=Settings([view], largest=10))
+    assert [one["title"] for one in least["views"]] == ["few"]  # phase planes need many signals
+    assert {name for x, y, *_ in least["curves"] for name in (x, *y.split(" + "))} <= set(fewer["columns"])
     assert not data_of(*runs, settings=Settings([view], largest=10**9))["partial"]
 
 
@@ -111,6 +115,23 @@ def test_no_runs_too_many_and_empty_ones_are_refused():
     ):
         with pytest.raises(ResultsError, match=words):
             viewer(runs)
+
+
+def test_columns_are_looked_up_a_number_of_times_that_grows_with_the_runs_alone(monkeypatch):
+    looked_up, columns_of = [], viewer_module.columns_of
+
+    def counting(*names):
+        looked_up.append(names)
+        return columns_of(*names)
+
+    monkeypatch.setattr(viewer_module, "columns_of", counting)
+    counts = []
+    for many in (5, 10):
+        looked_up.clear()
+        data = data_of(*many * [whole_car(n=11)])
+        assert {curve[-1] for curve in data["curves"]} >= {*range(many)}
+        counts.append(len(looked_up))
+    assert counts[1] <= 2 * counts[0]
 
 
 def test_the_friction_that_a_controller_believes_in_makes_no_circle():

@@ -79,7 +79,8 @@ class Settings:
         metrics: those in the table of runs.
         marks, limits: dashed lines; those of a run are hidden with it.
         largest: size of the samples [bytes]; beyond it, the page carries the signals of the views and of the
-            road alone, and still beyond it, of the road without the forces of the tyres. 0: no limit.
+            road alone, still beyond it, of the road without the forces of the tyres, and then no phase planes
+            either. 0: no limit.
         ghosts: numbers of runs that are drawn faintly behind the others.
         bands: numbers of runs whose closed line is filled, behind all others; not over time.
         offsets: number of a measured run -> time [s] by which it is drawn later at first.
@@ -193,13 +194,18 @@ def carried(
     planes, curves = ([], []) if settings.largest == LEAST else planes_of(results)
     drawn = [_drawn(view, results) for view in (*settings.views, *planes)]
     views = [view for view in drawn if view["panels"]] or drawn[:1]
+    own = [view for view in views if any(view is one for one in drawn[: len(settings.views)])] or views[:1]
     packed = packed or pack(results)
+    axes_of = {  # of a plane, in which every run has curves
+        (x, y): [*zip(_columns(results, x), _panels(results, y), strict=False)]
+        for x, y in dict.fromkeys((curve.x, curve.y) for curve in curves)
+    }
     notes = [notes_of(run.results, road) for run, road in zip(runs, roads, strict=True)]
     every, sparse = packed, [road and without_tyres(road) for road in roads]
-    for kept in (roads, sparse):
+    for views_kept, roads_kept in ((views, roads), (views, sparse), (own, sparse)):
         if not settings.largest or all(size <= settings.largest for size in _sizes(packed)):
             break
-        roads, needed = kept, _needed(views, kept)
+        views, roads, needed = views_kept, roads_kept, _needed(views_kept, roads_kept)
         packed = [run.only(needed) for run in every]
     carried = {name for run in packed for name in run.columns}
     data = {
@@ -216,8 +222,9 @@ def carried(
         "curves": [
             [x, y, text, [*xs], [*ys], run]
             for x_name, y_name, text, xs, ys, run in curves
-            for x, y in zip(_columns(results, x_name), _panels(results, y_name), strict=False)
-            for y in [y.partition(",")[0]]
+            for x, panel in axes_of[x_name, y_name]
+            for y in [panel.partition(",")[0]]
+            if {x, *y.split(" + ")} <= carried
         ],
         "why": [
             [number, [_sentence(reason, number, best, reasons[-1]) for reason in reasons], best]
