@@ -14,7 +14,6 @@ from yawbench.fmus.fmu import Value
 from yawbench.foundation.errors import Diagnostic, ResultsError, ScenarioError
 from yawbench.foundation.messages import hint, listed, short
 from yawbench.foundation.progress import bar
-from yawbench.metrics import expressions
 from yawbench.orchestrator.master.fmi import open_instance
 from yawbench.orchestrator.master.run_lifecycle import OpenInstance
 from yawbench.orchestrator.master.simulate import simulate_in_memory
@@ -342,7 +341,7 @@ class Runs:
             with arguments.as_scenario_errors(f"{name}:"):
                 si_number(bound, self._findings.unit(key))
         spec, name, asked = self._findings.spec, key, {}
-        whether = expressions.metric(spec.metrics[key].metric).measure.whether
+        whether = key in self._findings.whether
         if len(given) > 1 or not (given or whether):
             which = listed(bounds, last="or")
             raise ScenarioError(

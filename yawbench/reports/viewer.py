@@ -20,7 +20,7 @@ from markupsafe import Markup
 
 from yawbench.events.kinds import events_in
 from yawbench.events.why import Reason, far_of, label_of, lost_among
-from yawbench.figures.display import LabelledRun, digits_apart, shown, shown_unit, unit_of_signal
+from yawbench.figures.display import LabelledRun, digits_apart, shown, shown_unit, shown_value, unit_of_signal
 from yawbench.figures.plots import changes_of, spans_of
 from yawbench.figures.style import LINES, MEASURED_LINE, line_style
 from yawbench.foundation.errors import ResultsError
@@ -425,9 +425,7 @@ def _values(runs: Sequence[LabelledRun], name: str) -> list[str]:
     wanted = metric(name)
     values = [(run.results, evaluate(run.results, wanted)) for run in runs]
     return [
-        shown(value.number, value.shown_in) + (", still growing" if _grows(run, wanted) else "")
-        if value is not None
-        else ""
+        shown_value(value) + (", still growing" if _grows(run, wanted) else "") if value is not None else ""
         for run, value in values
     ]
 

@@ -234,7 +234,7 @@ def sample_tables(
     only = [*keys] or [*metrics, *findings.spec.probabilities]
     differences = differences_of(findings, groups)
     of = {
-        "statistics": [key for key in metrics if not _whether(findings, key)],
+        "statistics": [key for key in metrics if key not in findings.whether],
         "probabilities": asked(findings),
         "differences": metrics if differences else [],
         "sensitivity": metrics,
@@ -348,7 +348,7 @@ def _statistics(findings: ExperimentResult, groups: Sequence[Group]) -> Table:
         ),
     ]
     means = [
-        probability(int(some.sum()), len(some)) if _whether(findings, key) and len(some) else mean(some)
+        probability(int(some.sum()), len(some)) if key in findings.whether and len(some) else mean(some)
         for (_, key), some in zip(rows, numbers, strict=True)
     ]
     percentiles = [
@@ -371,12 +371,7 @@ def _statistics(findings: ExperimentResult, groups: Sequence[Group]) -> Table:
 def asked(findings: ExperimentResult) -> list[str]:
     """Return the names of what a sample tells the probability of: conditions, and metrics that are 0 or 1."""
     spec = findings.spec
-    return [*dict.fromkeys((*spec.probabilities, *(key for key in spec.metrics if _whether(findings, key))))]
-
-
-def _whether(findings: ExperimentResult, key: str) -> bool:
-    """Return whether a metric is 0 or 1 in each run."""
-    return metric(findings.spec.metrics[key].metric).measure.whether
+    return [*dict.fromkeys((*spec.probabilities, *(key for key in spec.metrics if key in findings.whether)))]
 
 
 def holding(findings: ExperimentResult, group: Group, name: str) -> tuple[int, int, int]:
