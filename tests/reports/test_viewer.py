@@ -20,15 +20,15 @@ from tests.reports.made_up import MU, SIZES, data_in, head_of, unpacked, whole_c
 from yawbench.components.driving.track import LaneChangeParameters, Track
 from yawbench.figures.display import digits_of, shown_unit
 from yawbench.figures.panels import LabelledRun
-from yawbench.foundation.errors import ResultsError
+from yawbench.foundation.errors import ResultsError, ScenarioError
 from yawbench.measurements.measured_results import MeasuredResults
 from yawbench.orchestrator.results.reader import Results
 from yawbench.orchestrator.results.run_record import ConnectionRecord, RunRecord
 from yawbench.reports import viewer as viewer_module
 from yawbench.reports.page_parts import without_comments
-from yawbench.reports.viewer import MOST, Settings, answer_of, page, still_of, viewer
+from yawbench.reports.viewer import MOST, Settings, answer_of, check_panels, page, still_of, viewer
 from yawbench.reports.viewer_data import pack
-from yawbench.reports.viewer_views import PANELS, View
+from yawbench.reports.viewer_views import PANELS, View, views_of
 from yawbench.vocabulary.lane_change import lanes_of
 from yawbench.vocabulary.wheels import WHEELS
 
@@ -71,6 +71,31 @@ def test_a_view_takes_errors_differences_wheels_and_another_axis():
     ]  # fmt: skip
     assert len(first["panels"]) == 2 + len(wheels) and len(wheels) == 4
     assert (second["shown"], second["x"]) == ([1], "plant.sideslip")
+
+
+def test_panels_of_a_page_are_views_and_unknown_ones_are_refused():
+    runs = labelled(car(), car(2.0))
+    names = [
+        "sideslip_error",
+        "yaw_rate - yaw_rate_ref",
+        "yaw_rate, steer_angle",
+        "yaw_rate(sideslip)",
+        "path",
+    ]
+    check_panels(runs, names)
+    over_time, portrait = views_of(names)
+    assert [*over_time.panels] == names[:3]
+    assert (portrait.title, portrait.x, *portrait.panels) == (names[3], "sideslip", "yaw_rate")
+    for wrong in (
+        "sidslip",
+        "yaw_rate - sidslip",
+        "yaw_rate, sidslip",
+        "yaw_rate(sidslip)",
+        "sidslip(yaw_rate)",
+    ):
+        with pytest.raises(ScenarioError) as refused:
+            check_panels(runs, [wrong])
+        assert mentions(str(refused.value), "--panel", wrong)
 
 
 def test_signals_have_the_label_unit_and_factor_of_the_figures():

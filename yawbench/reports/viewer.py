@@ -20,6 +20,7 @@ from markupsafe import Markup
 
 from yawbench.events.kinds import events_in
 from yawbench.events.why import Reason, far_of, label_of, lost_among
+from yawbench.figures import panels as of_figures
 from yawbench.figures.display import LabelledRun, digits_apart, shown, shown_unit, shown_value, unit_of_signal
 from yawbench.figures.plots import changes_of, spans_of
 from yawbench.figures.style import LINES, MEASURED_LINE, line_style
@@ -45,7 +46,7 @@ from .page_parts import Assets, Part, ViewerPage, render, static, without_commen
 from .planes import planes_of
 from .road import legend_of, notes_of, road_of, without_tyres
 from .viewer_data import PackedRun, is_numeric, pack
-from .viewer_views import Bound, Mark, View
+from .viewer_views import Bound, Mark, View, views_of
 
 SCRIPTS = (
     "viewer_data.js", "viewer_panels.js", "viewer_draw.js", "viewer_picture.js", "viewer_events.js",
@@ -395,6 +396,22 @@ def _panels(results: Sequence[Results], spec: str) -> Iterator[str]:
         else:
             beside = [name for other in others for name in _columns(results, other)]
             yield ",".join([column, *(beside or references[:1])])
+
+
+def check_panels(runs: Sequence[LabelledRun], names: Sequence[str], *, option: str = "--panel ") -> None:
+    """Check that every name selects a panel of a page of runs; raises as `figures.panels.check_panels`."""
+    of_figures.check_panels(runs, names, option=option, selected=_on_page)
+
+
+def _on_page(runs: Sequence[LabelledRun], name: str) -> Sequence[str]:
+    """Return the panels that a name selects on a page: none if a part of it selects none."""
+    if name == "path":
+        return [name]
+    results = [run.results for run in runs]
+    (view,) = views_of((name,))
+    found = [[*_panels(results, part)] for panel in view.panels for part in panel.split(",")]
+    known = all(found) and (view.x == "time" or _columns(results, view.x))
+    return view.panels if known else []
 
 
 def _needed(views: Sequence[Mapping[str, Any]], roads: Sequence[Mapping[str, Any] | None]) -> set[str]:
