@@ -519,7 +519,8 @@ class Runs:
     def __repr__(self) -> str:
         result, warning = self._findings, self._findings.remarkable()
         noted = f"; {warning}" if warning else ""
-        return f"<Runs {result.spec.title!r}: {len(result.records)} runs, {len(result.failed)} failed{noted}>"
+        title, ran = result.experiment.title, len(result.records)
+        return f"<Runs {title!r}: {ran} runs, {len(result.failed)} failed{noted}>"
 
     def _repr_html_(self) -> str:
         return str(self.table.drop(columns="key").to_html(index=False, na_rep=""))

@@ -79,6 +79,8 @@ def _labelled(runs: object) -> list[LabelledRun]:
             shared = [change for change in changes[0] if all(change in made for made in changes)]
             own = [changed(change for change in made if change not in shared) for made in changes]
             titles = [f"{k + 1}: {own[k] or title}" for k, title in enumerate(titles)]
+        elif len(titles) > 1:  # a page on one run tells below its title what was changed
+            titles = [run._full_title if isinstance(run, Run) else "" for run in several]
         named = dict(zip(titles, several, strict=True))
     return [
         LabelledRun(label, arguments.instance(run, f"runs[{label!r}]", Run, "Scenario.run").results)

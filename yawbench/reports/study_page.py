@@ -110,7 +110,6 @@ class StudyPage(Page):
     """Chosen: with the claims, a page stays below 2,000 elements."""
     id: str  # anchor on the overview, key of its side file there
     source: str  # of the experiment
-    changed: str  # overrides from the command line
     counts: Mapping[str, int]  # verdict of claims -> how many
     reach: str  # where claims were judged
     answer: str  # the result in sentences
@@ -187,10 +186,9 @@ def chapter(
     ]
     return StudyPage(
         id=anchor(f"{experiment.path.absolute().parent.name} {experiment.path.stem}"),
-        title=spec.title,
+        title=experiment.title,
         assets=assets(*SWEEP_ASSETS if sweep else ()) if content or sweep or validations else None,
         source=spec.source,
-        changed=changed(experiment.by_options),
         counts=counts_of(findings.claims),
         reach=reach(findings),
         answer=" ".join(filter(None, (answer(findings), sweep and sweep_sentence(findings)))),
@@ -198,7 +196,7 @@ def chapter(
         checks=[judged(result, link_to_runs(findings, result, numbers)) for result in findings.checks],
         region=region_table(findings) if findings.regions else None,
         limits=limit_tables(findings),
-        systems=systems(plans, spec.title),
+        systems=systems(plans, experiment.title),
         content=content,
         sweep=sweep,
         figures=figure_files(findings),

@@ -40,7 +40,7 @@ from yawbench.metrics.expressions import (
 from yawbench.metrics.measures import words
 from yawbench.orchestrator.results.reader import Results
 from yawbench.orchestrator.results.run_record import RunStatus
-from yawbench.orchestrator.scenario.overrides import with_changes
+from yawbench.orchestrator.scenario.overrides import with_words
 
 from .page_parts import Assets, Part, ViewerPage, render, static, without_comments
 from .planes import planes_of
@@ -300,13 +300,13 @@ def page(runs: Sequence[LabelledRun], settings: Settings = SETTINGS, *, title: s
         title: of the page; default: the scenario's title of a single run with its overrides, else the
             labels, of many runs the first.
     """
-    titles = list(dict.fromkeys(filter(None, (run.results.record.title for run in runs))))
-    alone = with_changes(titles[0], runs[0].results.record.overrides) if titles and len(runs) == 1 else ""
+    titles = dict.fromkeys(filter(None, (run.results.record.title for run in runs)))
+    made = with_words("; ".join(titles), changes_of(runs))
+    alone = len(runs) == 1 and bool(titles) and not title
     view = ViewerPage(
-        title=title or alone or _title(runs),
+        title=made if alone else title or _title(runs),
         sentence=answer_of(runs),
-        below="" if alone else "; ".join(titles),
-        changed="" if alone and not title else changes_of(runs),
+        below="" if alone else made,
         viewer=viewer(runs, settings, name="run", alone=True),
         assets=assets(),
     )
