@@ -14,7 +14,6 @@ from yawbench.fmus.fmu import Value
 from yawbench.foundation.errors import Diagnostic, ResultsError, ScenarioError
 from yawbench.foundation.messages import hint, listed, short
 from yawbench.foundation.progress import bar
-from yawbench.metrics import expressions
 from yawbench.orchestrator.master.fmi import open_instance
 from yawbench.orchestrator.master.run_lifecycle import OpenInstance
 from yawbench.orchestrator.master.simulate import simulate_in_memory
@@ -342,7 +341,7 @@ class Runs:
             with arguments.as_scenario_errors(f"{name}:"):
                 si_number(bound, self._findings.unit(key))
         spec, name, asked = self._findings.spec, key, {}
-        whether = expressions.metric(spec.metrics[key].metric).measure.whether
+        whether = key in self._findings.whether
         if len(given) > 1 or not (given or whether):
             which = listed(bounds, last="or")
             raise ScenarioError(
@@ -520,7 +519,8 @@ class Runs:
     def __repr__(self) -> str:
         result, warning = self._findings, self._findings.remarkable()
         noted = f"; {warning}" if warning else ""
-        return f"<Runs {result.spec.title!r}: {len(result.records)} runs, {len(result.failed)} failed{noted}>"
+        title, ran = result.experiment.title, len(result.records)
+        return f"<Runs {title!r}: {ran} runs, {len(result.failed)} failed{noted}>"
 
     def _repr_html_(self) -> str:
         return str(self.table.drop(columns="key").to_html(index=False, na_rep=""))

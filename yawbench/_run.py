@@ -294,12 +294,12 @@ class Run:
         return f"<Run {self._full_title!r}: {len(self)} rows of {len(self.results.columns)} variables{noted}>"
 
     def _repr_html_(self) -> str:
-        from yawbench.figures.display import shown
+        from yawbench.figures.display import shown_value
 
         changed = "".join(
             f"<br>{escape(str(change.target))} = {escape(str(change.plain))}" for change in self.changes
         )
-        cells = [(metric(name).title, shown(x.number, x.shown_in)) for name, x in self.metrics().items()]
+        cells = [(metric(name).title, shown_value(x)) for name, x in self.metrics().items()]
         rows = "".join(f"<tr><td>{escape(title)}</td><td>{escape(value)}</td></tr>" for title, value in cells)
         noted = "".join(f"<br>⚠ {escape(str(warning))}" for warning in warnings_in(self.diagnostics))
         return f"<b>{escape(self.title)}</b>{changed}{noted}<table>{rows}</table>"

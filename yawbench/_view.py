@@ -11,10 +11,9 @@ from yawbench.figures.display import LabelledRun
 from yawbench.foundation.errors import ResultsError
 from yawbench.foundation.messages import counted, listed
 from yawbench.foundation.safe_files import reason, write_whole
-from yawbench.metrics.expressions import columns_of
 from yawbench.orchestrator.scenario.overrides import changed
-from yawbench.reports.viewer import SETTINGS, Settings, page
-from yawbench.reports.viewer_views import View as Selection
+from yawbench.reports.viewer import Settings, check_panels, page
+from yawbench.reports.viewer_views import views_of
 
 from . import arguments
 from ._run import Run
@@ -49,18 +48,13 @@ def view(
         height: height in a notebook [px].
 
     Raises:
-        ResultsError: there are no or too many runs, or no run has recorded the signal of a panel.
+        ResultsError: there are no or too many runs.
+        ScenarioError: no run has recorded a panel.
     """
     labelled = _labelled(runs)
     wanted = arguments.texts(panels, "panels")
-    for name in wanted:
-        parts = [
-            part.strip().removesuffix("_error") for panel in name.split(",") for part in panel.split(" - ")
-        ]
-        for part in parts:
-            if not any(columns_of(run.results, part) for run in labelled):
-                raise ResultsError(f"panel {name!r}: no run has recorded {part!r}.")
-    settings = Settings((Selection(panels=wanted),)) if wanted else SETTINGS
+    check_panels(labelled, wanted, option="panel ")
+    settings = Settings([*views_of(wanted)])
     title = arguments.text(title, "title", empty=True)
     names = tuple(run.label for run in labelled)
     if (
@@ -85,6 +79,8 @@ def _labelled(runs: object) -> list[LabelledRun]:
             shared = [change for change in changes[0] if all(change in made for made in changes)]
             own = [changed(change for change in made if change not in shared) for made in changes]
             titles = [f"{k + 1}: {own[k] or title}" for k, title in enumerate(titles)]
+        elif len(titles) > 1:  # a page on one run tells below its title what was changed
+            titles = [run._full_title if isinstance(run, Run) else "" for run in several]
         named = dict(zip(titles, several, strict=True))
     return [
         LabelledRun(label, arguments.instance(run, f"runs[{label!r}]", Run, "Scenario.run").results)

@@ -348,5 +348,9 @@ def fmu_of(swap: Override) -> str:
 
 def with_changes(title: str, changes: Iterable[Override]) -> str:
     """Return a title in one line, followed by the overrides."""
-    words = changed(changes)
+    return with_words(title, changed(changes))
+
+
+def with_words(title: str, words: str) -> str:
+    """Return a title in one line, followed by overrides in words."""
     return f"{title} (changed: {words})" if words and title else f"changed: {words}" if words else title

@@ -58,4 +58,5 @@ def test_a_mistake_on_the_command_line_is_answered_by_what_to_do(said, arguments
 def test_the_results_of_a_run_in_place_of_its_scenario_are_told_from_a_folder_of_scenarios(said):
     assert said(*RUN, "--out", "done")[0] in (None, 0)
     in_one_sentence(said, ("check", "done"), ["done", "results", "'yawbench plot done'"])
-    in_one_sentence(said, ("plot", "done", "--panel", "sidslip"), ["'sideslip'"])
+    for page in ((), ("--page",)):
+        in_one_sentence(said, ("plot", "done", "--panel", "sidslip", *page), ["'sideslip'"])

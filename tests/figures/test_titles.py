@@ -162,6 +162,21 @@ def test_the_heading_of_a_page_on_one_run_and_its_text_in_python_name_what_was_c
     assert html.fromstring(page([LabelledRun("a", made())])).findtext(".//h1") == made().record.title
 
 
+def test_a_page_on_several_runs_names_what_was_changed_beside_their_titles():
+    from lxml import html
+
+    import yawbench as yb
+
+    slow, fast = made(SLOW), made()
+    slow.record.title, fast.record.title = "Lane change at 60 km/h", "Lane change at 80 km/h"
+    shown = html.fromstring(yb.view([yb.Run(slow), yb.Run(fast)]).html)
+    assert mentions(shown.findtext(".//h1"), "60 km/h", "50 km/h", "80 km/h")
+    fast.record.title = slow.record.title
+    named = html.fromstring(yb.view({"slow": yb.Run(slow), "other": yb.Run(fast)}).html)
+    (below,) = [p.text for p in named.iter("p") if slow.record.title in (p.text or "")]
+    assert mentions(below, "slow", "50 km/h")
+
+
 def test_changes_are_told_in_words():
     assert mentions(changed([OFF, ICE]), "controller_off", "inputs.friction*", "0.3")
     assert mentions(changed([Override.of("plant.locked", True, "--set")]), "plant.locked", "true")

@@ -12,7 +12,7 @@ import pytest
 
 from tests.orchestrator.recorded import car, noted, results
 from tests.refusals import mentions, refused
-from yawbench.figures.display import digits_of, shown, shown_unit
+from yawbench.figures.display import digits_of, shown, shown_unit, shown_value
 from yawbench.figures.plots import LabelledRun, draw, shown_by
 from yawbench.foundation.errors import ScenarioError
 from yawbench.metrics import measures
@@ -34,6 +34,7 @@ from yawbench.reports.divergence import divergence, partings_table
 from yawbench.studies.claim_schema import Condition
 from yawbench.studies.driven_tests import run_table
 from yawbench.studies.listings import metrics_of_run
+from yawbench.studies.tables import Table
 from yawbench.vocabulary.wheels import WHEELS
 
 T = np.linspace(0.0, 2.0, 20001)
@@ -606,3 +607,20 @@ def test_a_line_has_a_gap_while_the_car_stands_and_keeps_its_time():
     assert np.nanmax(np.abs(line.get_ydata())) == pytest.approx(np.degrees(0.02))
     assert of_slip.get_xlim() == pytest.approx(of_speed.get_xlim())
     assert max(map(abs, figure.axes[2].get_xlim())) < 2.0
+
+
+def test_a_reference_is_named_after_its_signal_also_of_wheels():
+    wheels = f"{measures.words('wheel_torque_*')} reference"
+    assert measures.words("sideslip_ref") == f"{measures.words('sideslip')} reference"
+    assert measures.words("wheel_torque_ref_*") == wheels
+    assert measures.words("wheel_torque_ref_fl") == f"{wheels}, front left"
+    assert mentions(metric("peak(yaw_rate_ref)").title, f"{measures.words('yaw_rate')} reference")
+
+
+def test_whether_something_happens_in_a_run_is_shown_as_yes_or_no_and_stays_a_number():
+    straight, spun = ({"plant.sideslip": x * SINE} for x in (0.1, 1.5))
+    no, yes = (evaluate(results(columns, T), metric("spins(sideslip)")) for columns in (straight, spun))
+    assert [shown_value(no), shown_value(yes)] == ["no", "yes"]
+    assert [no.number, yes.number, yes.unit] == [0.0, 1.0, "1"]
+    table = Table("", ["run", "spins"], [["a", yes]])
+    assert table.text() == [["a", "yes"]] and table.values(1) == [1.0]

@@ -31,13 +31,17 @@ def driven(tmp_path_factory) -> SimpleNamespace:
     folder = tmp_path_factory.mktemp("ranking")
     file, out = folder / "small.yaml", folder / "out"
     file.write_text(SMALL)
-    told, lacking = [], {}
+    told, printed, lacking = [], [], {}
     for only in (("--only", "fuzzy_pid"), ()):
-        with contextlib.redirect_stderr(io.StringIO()) as said:
+        with (
+            contextlib.redirect_stderr(io.StringIO()) as said,
+            contextlib.redirect_stdout(io.StringIO()) as shown,
+        ):
             assert status_of("rank", file, "--out", out, "--jobs", 2, *only) == 0
         told.append(said.getvalue())
+        printed.append(shown.getvalue())
         lacking = lacking or {"rows": rows(out / "table.csv"), "page": (out / "report.html").read_text()}
-    return SimpleNamespace(file=file, out=out, told=told, **lacking)
+    return SimpleNamespace(file=file, out=out, told=told, printed=printed, **lacking)
 
 
 @pytest.fixture(scope="module")
@@ -45,8 +49,16 @@ def page(driven) -> Path:
     return driven.out / "report.html"
 
 
+def test_entries_that_were_not_asked_for_are_not_printed_but_counted(driven):
+    title = load_ranking(driven.file).entries["none"][0].title
+    some, every = driven.printed
+    assert title in every and title not in some
+    assert mentions(some, "1 entry", "--only") and "missing" not in some
+    assert "--only" not in every
+
+
 def test_a_small_matrix_goes_on_where_it_was_and_shows_what_is_missing(driven, page, tmp_path, capsys):
-    assert mentions(driven.told[0], "ranked", "missing", "none")
+    assert "missing" not in driven.told[0]
     assert mentions(driven.page, "build", "control")
     assert [(one["entry"], one["place"]) for one in driven.rows] == [("fuzzy_pid", "1"), ("none", "")]
     assert mentions(driven.told[1], "4 runs", "2", "finished")

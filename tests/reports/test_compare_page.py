@@ -43,6 +43,11 @@ def texts(tree, path: str) -> list[str]:
     return [" ".join(element.text_content().split()) for element in tree.cssselect(path)]
 
 
+def test_the_heading_says_what_was_exchanged_and_changed(tree):
+    (heading,) = texts(tree, "h1")
+    assert mentions(heading, "controller", "stop_time = 3 s")
+
+
 def test_metrics_stand_side_by_side_with_their_difference_from_the_first(tree):
     fuzzy = "controller_fuzzy_feedback"
     (table,) = tree.cssselect("table.first-free")

@@ -20,14 +20,15 @@ from tests.reports.made_up import MU, SIZES, data_in, head_of, unpacked, whole_c
 from yawbench.components.driving.track import LaneChangeParameters, Track
 from yawbench.figures.display import digits_of, shown_unit
 from yawbench.figures.panels import LabelledRun
-from yawbench.foundation.errors import ResultsError
+from yawbench.foundation.errors import ResultsError, ScenarioError
 from yawbench.measurements.measured_results import MeasuredResults
 from yawbench.orchestrator.results.reader import Results
 from yawbench.orchestrator.results.run_record import ConnectionRecord, RunRecord
+from yawbench.reports import viewer as viewer_module
 from yawbench.reports.page_parts import without_comments
-from yawbench.reports.viewer import MOST, Settings, answer_of, page, still_of, viewer
+from yawbench.reports.viewer import MOST, Settings, answer_of, check_panels, page, still_of, viewer
 from yawbench.reports.viewer_data import pack
-from yawbench.reports.viewer_views import PANELS, View
+from yawbench.reports.viewer_views import PANELS, View, views_of
 from yawbench.vocabulary.lane_change import lanes_of
 from yawbench.vocabulary.wheels import WHEELS
 
@@ -72,6 +73,31 @@ def test_a_view_takes_errors_differences_wheels_and_another_axis():
     assert (second["shown"], second["x"]) == ([1], "plant.sideslip")
 
 
+def test_panels_of_a_page_are_views_and_unknown_ones_are_refused():
+    runs = labelled(car(), car(2.0))
+    names = [
+        "sideslip_error",
+        "yaw_rate - yaw_rate_ref",
+        "yaw_rate, steer_angle",
+        "yaw_rate(sideslip)",
+        "path",
+    ]
+    check_panels(runs, names)
+    over_time, portrait = views_of(names)
+    assert [*over_time.panels] == names[:3]
+    assert (portrait.title, portrait.x, *portrait.panels) == (names[3], "sideslip", "yaw_rate")
+    for wrong in (
+        "sidslip",
+        "yaw_rate - sidslip",
+        "yaw_rate, sidslip",
+        "yaw_rate(sidslip)",
+        "sidslip(yaw_rate)",
+    ):
+        with pytest.raises(ScenarioError) as refused:
+            check_panels(runs, [wrong])
+        assert mentions(str(refused.value), "--panel", wrong)
+
+
 def test_signals_have_the_label_unit_and_factor_of_the_figures():
     signals = data_of(car())["signals"]
     assert signals["plant.yaw_rate"] == {
@@ -100,6 +126,9 @@ def test_beyond_the_largest_size_the_signals_of_the_views_and_the_road_remain():
     assert {"plant.sideslip", "plant.position_x"} <= set(fewer["columns"]) <= set(few) - of_tyres
     assert not any("tyre" in note for note in fewer["notes"])
     assert data_of(*runs, settings=Settings([view], largest=10))["partial"]
+    least = data_of(*runs, settings=Settings([view], largest=10))
+    assert [one["title"] for one in least["views"]] == ["few"]  # phase planes need many signals
+    assert {name for x, y, *_ in least["curves"] for name in (x, *y.split(" + "))} <= set(fewer["columns"])
     assert not data_of(*runs, settings=Settings([view], largest=10**9))["partial"]
 
 
@@ -111,6 +140,23 @@ def test_no_runs_too_many_and_empty_ones_are_refused():
     ):
         with pytest.raises(ResultsError, match=words):
             viewer(runs)
+
+
+def test_columns_are_looked_up_a_number_of_times_that_grows_with_the_runs_alone(monkeypatch):
+    looked_up, columns_of = [], viewer_module.columns_of
+
+    def counting(*names):
+        looked_up.append(names)
+        return columns_of(*names)
+
+    monkeypatch.setattr(viewer_module, "columns_of", counting)
+    counts = []
+    for many in (5, 10):
+        looked_up.clear()
+        data = data_of(*many * [whole_car(n=11)])
+        assert {curve[-1] for curve in data["curves"]} >= {*range(many)}
+        counts.append(len(looked_up))
+    assert counts[1] <= 2 * counts[0]
 
 
 def test_the_friction_that_a_controller_believes_in_makes_no_circle():

@@ -161,6 +161,21 @@ def test_all_problems_of_all_jobs_are_found_before_any_runs(tmp_path):
     assert [one.location.file for one in error.value.diagnostics] == [first, second]
 
 
+def test_an_fmu_that_is_missing_is_told_once_with_all_places_that_need_it(tmp_path):
+    text = "stop_time: 1\nstep_size: 0.1\nunits:\n  a: {fmu: driver_nowhere}\n"
+    files = [tmp_path / name for name in ("first.yaml", "second.yaml", "third.yaml")]
+    for file in files:
+        file.write_text(text)
+    files[2].write_text(f"{text}  b: {{fmu: plant_nowhere}}\n")
+    with pytest.raises(ScenarioError) as error:
+        ready([Job(file.stem, file, tmp_path, fmus=tmp_path) for file in files])
+    driver, plant = error.value.diagnostics
+    assert (driver.location.file, driver.location.line) == (files[0], 4)
+    assert mentions(driver.message, "driver_nowhere", f"{files[1]}:4", f"{files[2]}:4")
+    assert (plant.location.file, plant.location.line) == (files[2], 5)
+    assert mentions(plant.message, "plant_nowhere") and "second" not in plant.message
+
+
 def test_results_can_be_read_by_several_processes(tmp_path):
     folders = [write(car(n=5), tmp_path / name) for name in "ab"]
     with Pool(2) as workers:

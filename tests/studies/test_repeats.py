@@ -10,7 +10,7 @@ from lxml import html
 from tests.refusals import each_mentions, mentions, texts_of
 from yawbench.commands.experiments import chapter_of
 from yawbench.components.sensing.noise import key, normal
-from yawbench.figures.display import shown
+from yawbench.figures.display import shown, shown_value
 from yawbench.foundation.errors import ScenarioError
 from yawbench.metrics.expressions import MetricValue
 from yawbench.reports.page_parts import render
@@ -157,6 +157,15 @@ def test_a_metric_may_have_median_and_range_or_a_share_over_its_repeats(load, fi
     share = over("share")["right/noisy", "last"]
     assert (share.number, share.unit, share.between) == (1.0, "1", tuple(share_bounds(4, 4)))
     assert mentions(shown(share.number, share.shown_in, between=share.between), "100", "39.8")
+
+
+def test_whether_something_happens_is_yes_or_no_in_a_run_and_a_share_over_its_repeats(load, fmus, tmp_path):
+    own = load(("metric: final(sensor.yaw_rate)", "metric: changes(sensor.yaw_rate)"))
+    found = findings_of(own, fmus, tmp_path)
+    over = {run: shown_value(found.values[run, "last"]) for run in ("right/quiet", "right/noisy")}
+    assert over == {"right/quiet": "0 %", "right/noisy": "100 %"}
+    for case in found.experiment.cases:
+        assert shown_value(found.value(case, "last")) == ("yes" if "noisy" in case.run.name else "no")
 
 
 def test_a_grid_says_how_far_down_its_columns_hold(findings):

@@ -100,6 +100,7 @@ def write_view(
 
     Raises:
         ResultsError: a run cannot be read, or the page cannot be written.
+        ScenarioError: no run has recorded a panel.
     """
     from yawbench.foundation.safe_files import write_whole
 
@@ -116,8 +117,9 @@ def write_view(
 
 def page_of(folders: Sequence[Path], labels: Sequence[str], panels: Sequence[str], start: float) -> str:
     """Return the page of a viewer; for arguments and errors see `write_view`."""
-    from yawbench.reports.viewer import SETTINGS, Settings, page
-    from yawbench.reports.viewer_views import View
+    from yawbench.reports.viewer import Settings, check_panels, page
+    from yawbench.reports.viewer_views import views_of
 
     runs = labelled(labels, folders, start)
-    return page(runs, Settings((View(panels=panels),)) if panels else SETTINGS)
+    check_panels(runs, panels)
+    return page(runs, Settings([*views_of(panels)]))

@@ -86,7 +86,7 @@ def converge(
     moving = [f"{name}*" for name in SPEED_SIGNALS if signal.rpartition(".")[2] in ANGLES]
     findings = conduct(experiment, folder, options, each, record=(signal, *moving))
     rows = measure(findings, signal)
-    table = convergence_table(rows, experiment.spec.title)
+    table = convergence_table(rows, experiment.title)
     write_whole(folder / "converge.csv", to_csv(columns_of(rows)))
     print_tables([table])
     command = command_of(
@@ -100,9 +100,9 @@ def converge(
     charts = []
     if any(row.error for row in rows):
         note = f"yawbench converge {scenario} · instances with their own step size keep it"
-        figure = convergence_figure(rows, signal, experiment.spec.title, note)
+        figure = convergence_figure(rows, signal, experiment.title, note)
         save(figure, folder / "converge")
-        charts = [image_of(folder / "converge.svg", experiment.spec.title)]
+        charts = [image_of(folder / "converge.svg", experiment.title)]
     chapter = chapter_of(findings, folder, command)
     say_page(write_page(replace(chapter, results=[table], charts=charts), folder))
     if any(row.failed for row in rows):

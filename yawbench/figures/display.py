@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable
 from typing import NamedTuple
 
+from yawbench.metrics.expressions import MetricValue
 from yawbench.metrics.measures import si_of, symbol, variable_of
 from yawbench.orchestrator.results.reader import Results
 from yawbench.vocabulary.units import SHOWN
@@ -77,6 +78,13 @@ def shown(
     if half:
         number += f" ± {digits_of(half * factor, 2)}"
     return f"{number} {text}".rstrip() if math.isfinite(value) else number
+
+
+def shown_value(value: MetricValue, *, digits: int = DIGITS) -> str:
+    """Format the value of a metric, with its interval; whether something happens in a run as yes or no."""
+    if value.whether:
+        return "yes" if value.number else "no"
+    return shown(value.number, value.shown_in, digits=digits, half=value.half, between=value.between)
 
 
 def digits_apart(pairs: Iterable[tuple[float, float]], unit: str, digits: int = DIGITS) -> int:

@@ -108,13 +108,20 @@ def panels_of(runs: Sequence[LabelledRun], name: str, *, whole: bool = False) ->
     ]
 
 
-def check_panels(runs: Sequence[LabelledRun], names: Sequence[str], *, option: str = "--panel ") -> None:
+def check_panels(
+    runs: Sequence[LabelledRun],
+    names: Sequence[str],
+    *,
+    option: str = "--panel ",
+    selected: Callable[[Sequence[LabelledRun], str], Sequence[object]] = panels_of,
+) -> None:
     """Check that every name selects a panel of at least one run.
 
     Args:
         runs: the runs to draw.
         names: of panels.
         option: text before a name in messages.
+        selected: returns what a name selects.
 
     Raises:
         ScenarioError: with a sentence for each name that selects nothing.
@@ -125,7 +132,7 @@ def check_panels(runs: Sequence[LabelledRun], names: Sequence[str], *, option: s
     problems = [
         f"{option}{cut(name)}: no run has recorded it{hint(name, known, lead='there are')}"
         for name in names
-        if not panels_of(runs, name)
+        if not selected(runs, name)
     ]
     if problems:
         raise ScenarioError(problems, code="signal-unknown")

@@ -133,6 +133,8 @@ def _times_seconds(unit: str, power: int) -> str:
 class MetricValue(WithUnit):
     """The value of a metric in one run, in SI; `percent`: tables show it, a ratio, in per cent.
 
+    `whether`: it is 1 if something happens in a run and 0 if not, which tables show as yes and no.
+
     Over several repeats it is the mean, and `half` is half the width of its confidence interval. If it is
     their median or a share, `between` has their range or the share's interval, `half` its larger distance.
 
@@ -146,6 +148,7 @@ class MetricValue(WithUnit):
     half: float = 0.0
     between: tuple[float, float] | None = None
     percent: bool = field(default=False, kw_only=True, repr=False)
+    whether: bool = field(default=False, kw_only=True, repr=False, compare=False)
 
 
 def during(window: TimeWindow | None, lead: str = "") -> str:
@@ -305,7 +308,8 @@ def evaluate(results: Results, chosen: Metric, window: TimeWindow | None = None)
     number = float(np.max(numbers))  # np.max, unlike max, propagates the NaN of any wheel
     if math.isnan(number):
         return None
-    return MetricValue(number, chosen.unit(si_of(results.units[signals[0][0]])[0]))
+    unit = chosen.unit(si_of(results.units[signals[0][0]])[0])
+    return MetricValue(number, unit, whether=chosen.measure.whether)
 
 
 def angles_in(results: Results) -> set[str]:

@@ -422,5 +422,7 @@ def words(name: str) -> str:
     """Return a variable in words, capitalized, with its wheel: "Wheel torque, front left"."""
     if name[-2:] in WHEEL_NAMES and name[-3:-2] == "_":
         return f"{words(f'{name[:-2]}*')}, {WHEEL_NAMES[name[-2:]]}"
+    if name.removesuffix("_*").endswith("_ref"):
+        return f"{words(name.removesuffix('_*').removesuffix('_ref'))} reference"
     known = SIGNALS[name].words if name in SIGNALS else ""
     return known or name.replace("_*", "").replace("_", " ").capitalize()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -110,10 +111,15 @@ def rank(
         _write(ranked, folder, command, pooled(context, options))
     output.answer(folder=folder, page=folder / PAGE, entries=records_in(columns_of_entries(ranked)))
     _pass_on(score for score in ranked.scores if not only or score.entry in only)
-    table = table_of(ranked, "gains", "speed lost", "chatter")
+    asked = [score for score in ranked.scores if not (only and score.missing and score.entry not in only)]
+    table = table_of(replace(ranked, scores=asked), "gains", "speed lost", "chatter")
     table.notes += lost_cells(ranked)
+    if left_out := len(ranked.scores) - len(asked):
+        table.notes.append(
+            f"Left out: {counted(left_out, 'entry', 'entries')} without runs that --only does not name."
+        )
     print_tables([table, *beside_matrix(ranked)])
-    if unranked := [score.entry for score in ranked.scores if score.missing]:
+    if unranked := [score.entry for score in asked if score.missing]:
         say(f"not ranked (missing runs): {', '.join(unranked)}")
 
 

@@ -190,9 +190,10 @@ def entries_table(settings: Sequence[SettingScores]) -> Table:
     rows: list[list[Cell]] = []
     for score in settings[0].scores:
         own = [next((s for s in one.scores if s.entry == score.entry and s.place), None) for one in settings]
-        rows.append(
-            [score.spec.title, *(None if s is None else str(s.count(RankedState.PASSED)) for s in own)]
-        )
+        if any(own):  # else it was not driven
+            rows.append(
+                [score.spec.title, *(None if s is None else str(s.count(RankedState.PASSED)) for s in own)]
+            )
     return Table("Conditions passed under each setting", headings, rows, [], {*range(1, len(headings))})
 
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
-from yawbench.figures.display import LabelledRun, digits_of, shown, shown_unit
+from yawbench.figures.display import LabelledRun, digits_of, shown, shown_unit, shown_value
 from yawbench.metrics.expressions import MetricValue, metric
 from yawbench.metrics.measures import variable_of
 from yawbench.studies.experiment_result import ExperimentResult
@@ -97,7 +97,7 @@ def metric_table(findings: ExperimentResult, runs: Sequence[LabelledRun]) -> Tab
         measure = chosen.name.partition("(")[0]
         least = _best(values, idle if measure in OF_CONTROL else ()) if measure in LESS_IS_BETTER else None
         cells = [
-            shown(value.number, value.shown_in)
+            shown_value(value)
             + f" {BEST}" * (k == least)
             + (f"\n{apart}" if k and (apart := difference(values[0], value)) else "")
             if value
@@ -161,5 +161,7 @@ def difference(first: MetricValue | None, other: MetricValue | None) -> str:
     unit, factor = shown_unit(other.shown_in)
     if apart == 0:
         return "the same"
+    if other.whether:
+        return ""
     size = digits_of(abs(apart) * factor)
     return f"{'+' if apart > 0 else '−'}{size} {'points' if unit == '%' else unit}".rstrip()

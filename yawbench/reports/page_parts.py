@@ -104,7 +104,6 @@ class ViewerPage(Page):
     template = "viewer_page.html.j2"
     viewer: Markup
     sentence: str = ""  # the result
-    changed: str = ""  # overrides of the scenario that the title names
     below: str = ""  # a line on what the data are
     warnings: Sequence[str] = ()  # shown below the sentence
     first: Sequence[Table] = ()  # tables before the viewer

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timezone
 from pathlib import Path
@@ -17,7 +17,6 @@ from urllib.parse import quote
 from markupsafe import Markup
 
 from yawbench.figures.display import LabelledRun, shown
-from yawbench.figures.phase_portrait import signals_of
 from yawbench.foundation.errors import ResultsError
 from yawbench.foundation.messages import counted, listed
 from yawbench.measurements.measured_results import filtered_alike
@@ -53,7 +52,6 @@ from yawbench.studies.result_tables import (
     run_tables,
     verdict,
 )
-from yawbench.studies.schema import FigureSpec
 from yawbench.studies.sections import sections
 from yawbench.studies.tables import Cell, Table
 from yawbench.studies.uncertainty import sample_tables
@@ -64,7 +62,7 @@ from .page_parts import FigureImage, Page, ViewerPage, anchor, image_of
 from .provenance import ParameterGroup, count_kinds, fmus_of, groups_of, programs_of
 from .sweep_view import SWEEP_ASSETS, sweep_sentence, sweep_view, write_sides
 from .viewer import LARGEST, MOST, Carried, Settings, answer_of, assets, carried, embedded
-from .viewer_views import PANELS, View
+from .viewer_views import View, views_of
 
 
 @dataclass(frozen=True)
@@ -112,7 +110,6 @@ class StudyPage(Page):
     """Chosen: with the claims, a page stays below 2,000 elements."""
     id: str  # anchor on the overview, key of its side file there
     source: str  # of the experiment
-    changed: str  # overrides from the command line
     counts: Mapping[str, int]  # verdict of claims -> how many
     reach: str  # where claims were judged
     answer: str  # the result in sentences
@@ -189,10 +186,9 @@ def chapter(
     ]
     return StudyPage(
         id=anchor(f"{experiment.path.absolute().parent.name} {experiment.path.stem}"),
-        title=spec.title,
+        title=experiment.title,
         assets=assets(*SWEEP_ASSETS if sweep else ()) if content or sweep or validations else None,
         source=spec.source,
-        changed=changed(experiment.by_options),
         counts=counts_of(findings.claims),
         reach=reach(findings),
         answer=" ".join(filter(None, (answer(findings), sweep and sweep_sentence(findings)))),
@@ -200,7 +196,7 @@ def chapter(
         checks=[judged(result, link_to_runs(findings, result, numbers)) for result in findings.checks],
         region=region_table(findings) if findings.regions else None,
         limits=limit_tables(findings),
-        systems=systems(plans, spec.title),
+        systems=systems(plans, experiment.title),
         content=content,
         sweep=sweep,
         figures=figure_files(findings),
@@ -459,7 +455,9 @@ def viewer_of(
         shown = [numbers[run.name] for run in findings.experiment.matching(spec.runs) if run.name in numbers]
         lively = _liveliest([run for number, run in enumerate(named.values()) if number in shown])
         drawn += [
-            (lively, view) for view in _views(spec, title_of(findings, spec), [*shown, *beside]) if shown
+            (lively, view)
+            for view in views_of(spec.panels, title_of(findings, spec), [*shown, *beside])
+            if shown
         ]
     ordered = [view for _, view in sorted(drawn, key=lambda item: -item[0])]
     settings = Settings([*views, *ordered] or [View()], largest=LARGEST)
@@ -467,16 +465,6 @@ def viewer_of(
     alike = filtered_alike([run.results for run in runs])
     runs = [LabelledRun(run.label, results) for run, results in zip(runs, alike, strict=True)]
     return carried(runs, settings), numbers
-
-
-def _views(spec: FigureSpec, title: str, shown: Sequence[int]) -> Iterator[View]:
-    """Yield the views of a figure: its signals over time, and each portrait."""
-    portraits = [(name, pair) for name in spec.panels if (pair := signals_of(name))]
-    over_time = tuple(name for name in spec.panels if name != "path" and not signals_of(name))
-    if over_time or not portraits:
-        yield View(title, over_time or PANELS, shown)
-    for name, (x, y) in portraits:
-        yield View(f"{title}: {name}", (y,), shown, x)
 
 
 def _liveliest(runs: Sequence[LabelledRun]) -> float:

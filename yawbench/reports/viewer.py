@@ -20,7 +20,8 @@ from markupsafe import Markup
 
 from yawbench.events.kinds import events_in
 from yawbench.events.why import Reason, far_of, label_of, lost_among
-from yawbench.figures.display import LabelledRun, digits_apart, shown, shown_unit, unit_of_signal
+from yawbench.figures import panels as of_figures
+from yawbench.figures.display import LabelledRun, digits_apart, shown, shown_unit, shown_value, unit_of_signal
 from yawbench.figures.plots import changes_of, spans_of
 from yawbench.figures.style import LINES, MEASURED_LINE, line_style
 from yawbench.foundation.errors import ResultsError
@@ -39,13 +40,13 @@ from yawbench.metrics.expressions import (
 from yawbench.metrics.measures import words
 from yawbench.orchestrator.results.reader import Results
 from yawbench.orchestrator.results.run_record import RunStatus
-from yawbench.orchestrator.scenario.overrides import with_changes
+from yawbench.orchestrator.scenario.overrides import with_words
 
 from .page_parts import Assets, Part, ViewerPage, render, static, without_comments
 from .planes import planes_of
 from .road import legend_of, notes_of, road_of, without_tyres
 from .viewer_data import PackedRun, is_numeric, pack
-from .viewer_views import Bound, Mark, View
+from .viewer_views import Bound, Mark, View, views_of
 
 SCRIPTS = (
     "viewer_data.js", "viewer_panels.js", "viewer_draw.js", "viewer_picture.js", "viewer_events.js",
@@ -79,7 +80,8 @@ class Settings:
         metrics: those in the table of runs.
         marks, limits: dashed lines; those of a run are hidden with it.
         largest: size of the samples [bytes]; beyond it, the page carries the signals of the views and of the
-            road alone, and still beyond it, of the road without the forces of the tyres. 0: no limit.
+            road alone, still beyond it, of the road without the forces of the tyres, and then no phase planes
+            either. 0: no limit.
         ghosts: numbers of runs that are drawn faintly behind the others.
         bands: numbers of runs whose closed line is filled, behind all others; not over time.
         offsets: number of a measured run -> time [s] by which it is drawn later at first.
@@ -193,13 +195,18 @@ def carried(
     planes, curves = ([], []) if settings.largest == LEAST else planes_of(results)
     drawn = [_drawn(view, results) for view in (*settings.views, *planes)]
     views = [view for view in drawn if view["panels"]] or drawn[:1]
+    own = [view for view in views if any(view is one for one in drawn[: len(settings.views)])] or views[:1]
     packed = packed or pack(results)
+    axes_of = {  # of a plane, in which every run has curves
+        (x, y): [*zip(_columns(results, x), _panels(results, y), strict=False)]
+        for x, y in dict.fromkeys((curve.x, curve.y) for curve in curves)
+    }
     notes = [notes_of(run.results, road) for run, road in zip(runs, roads, strict=True)]
     every, sparse = packed, [road and without_tyres(road) for road in roads]
-    for kept in (roads, sparse):
+    for views_kept, roads_kept in ((views, roads), (views, sparse), (own, sparse)):
         if not settings.largest or all(size <= settings.largest for size in _sizes(packed)):
             break
-        roads, needed = kept, _needed(views, kept)
+        views, roads, needed = views_kept, roads_kept, _needed(views_kept, roads_kept)
         packed = [run.only(needed) for run in every]
     carried = {name for run in packed for name in run.columns}
     data = {
@@ -216,8 +223,9 @@ def carried(
         "curves": [
             [x, y, text, [*xs], [*ys], run]
             for x_name, y_name, text, xs, ys, run in curves
-            for x, y in zip(_columns(results, x_name), _panels(results, y_name), strict=False)
-            for y in [y.partition(",")[0]]
+            for x, panel in axes_of[x_name, y_name]
+            for y in [panel.partition(",")[0]]
+            if {x, *y.split(" + ")} <= carried
         ],
         "why": [
             [number, [_sentence(reason, number, best, reasons[-1]) for reason in reasons], best]
@@ -292,13 +300,13 @@ def page(runs: Sequence[LabelledRun], settings: Settings = SETTINGS, *, title: s
         title: of the page; default: the scenario's title of a single run with its overrides, else the
             labels, of many runs the first.
     """
-    titles = list(dict.fromkeys(filter(None, (run.results.record.title for run in runs))))
-    alone = with_changes(titles[0], runs[0].results.record.overrides) if titles and len(runs) == 1 else ""
+    titles = dict.fromkeys(filter(None, (run.results.record.title for run in runs)))
+    made = with_words("; ".join(titles), changes_of(runs))
+    alone = len(runs) == 1 and bool(titles) and not title
     view = ViewerPage(
-        title=title or alone or _title(runs),
+        title=made if alone else title or _title(runs),
         sentence=answer_of(runs),
-        below="" if alone else "; ".join(titles),
-        changed="" if alone and not title else changes_of(runs),
+        below="" if alone else made,
         viewer=viewer(runs, settings, name="run", alone=True),
         assets=assets(),
     )
@@ -390,6 +398,22 @@ def _panels(results: Sequence[Results], spec: str) -> Iterator[str]:
             yield ",".join([column, *(beside or references[:1])])
 
 
+def check_panels(runs: Sequence[LabelledRun], names: Sequence[str], *, option: str = "--panel ") -> None:
+    """Check that every name selects a panel of a page of runs; raises as `figures.panels.check_panels`."""
+    of_figures.check_panels(runs, names, option=option, selected=_on_page)
+
+
+def _on_page(runs: Sequence[LabelledRun], name: str) -> Sequence[str]:
+    """Return the panels that a name selects on a page: none if a part of it selects none."""
+    if name == "path":
+        return [name]
+    results = [run.results for run in runs]
+    (view,) = views_of((name,))
+    found = [[*_panels(results, part)] for panel in view.panels for part in panel.split(",")]
+    known = all(found) and (view.x == "time" or _columns(results, view.x))
+    return view.panels if known else []
+
+
 def _needed(views: Sequence[Mapping[str, Any]], roads: Sequence[Mapping[str, Any] | None]) -> set[str]:
     """Return the columns of all views and roads."""
     panels = (panel for view in views for panel in view["panels"])
@@ -418,9 +442,7 @@ def _values(runs: Sequence[LabelledRun], name: str) -> list[str]:
     wanted = metric(name)
     values = [(run.results, evaluate(run.results, wanted)) for run in runs]
     return [
-        shown(value.number, value.shown_in) + (", still growing" if _grows(run, wanted) else "")
-        if value is not None
-        else ""
+        shown_value(value) + (", still growing" if _grows(run, wanted) else "") if value is not None else ""
         for run, value in values
     ]
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
+
+from yawbench.figures.phase_portrait import signals_of
 
 PANELS = ("sideslip", "yaw_rate", "acceleration_y", "yaw_moment", "steer_angle")
 """Signals shown first, with their references; chosen: what all four papers draw."""
@@ -26,6 +28,19 @@ class View:
     panels: Sequence[str] = PANELS
     shown: Sequence[int] | None = None
     x: str = "time"
+
+
+def views_of(panels: Sequence[str], title: str = "", shown: Sequence[int] | None = None) -> Iterator[View]:
+    """Yield the views that show panels of a figure: its signals over time, and each portrait `y(x)`.
+
+    The path needs none: a page draws the road.
+    """
+    portraits = [(name, pair) for name in panels if (pair := signals_of(name))]
+    over_time = tuple(name for name in panels if name != "path" and not signals_of(name))
+    if over_time or not portraits:
+        yield View(title or View.title, over_time or PANELS, shown)
+    for name, (x, y) in portraits:
+        yield View(": ".join(filter(None, (title, name))), (y,), shown, x)
 
 
 class Mark(NamedTuple):

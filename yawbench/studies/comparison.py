@@ -14,7 +14,7 @@ from yawbench.foundation.messages import counted, listed
 from yawbench.metrics.expressions import metric
 from yawbench.metrics.verdict import Status, worded
 from yawbench.orchestrator.plan import Override
-from yawbench.orchestrator.scenario.overrides import changed, swap_of
+from yawbench.orchestrator.scenario.overrides import swap_of
 from yawbench.orchestrator.scenario.schema_validation import made
 from yawbench.planner import Planner
 
@@ -143,11 +143,9 @@ def comparison_table(findings: ExperimentResult) -> Table:
     results, runs = findings.results, findings.experiment.runs.values()
     failed = [run.label for run in runs if run.name not in results]
     shown = [run for run in runs if run.name in results]
-    words = changed(findings.experiment.by_options)
-    notes = [f"changed: {words}"] if words else []
-    notes += remarks((run.label, results[run.name]) for run in shown)
+    notes = [*remarks((run.label, results[run.name]) for run in shown)]
     labels = [*(marked(run.label, results[run.name]) for run in shown), *failed]
-    table = Table(findings.spec.title, ["metric", "", *labels], notes=notes)
+    table = Table(findings.experiment.title, ["metric", "", *labels], notes=notes)
     for key, spec in findings.spec.metrics.items():
         cells: list[Cell] = [findings.values.get((run.name, key)) for run in shown]
         chosen = metric(spec.metric)

@@ -22,7 +22,6 @@ from yawbench.foundation.errors import ResultsError, ScenarioError
 from yawbench.metrics.expressions import MetricValue, while_moving
 from yawbench.metrics.measures import variable_of, words
 from yawbench.orchestrator.plan import Override
-from yawbench.orchestrator.scenario.overrides import with_changes
 from yawbench.orchestrator.signal_names import SignalName
 from yawbench.planner import Planner
 from yawbench.vehicles.motion import largest
@@ -80,8 +79,7 @@ def refinements(
             name = f"{algorithm}/{_milliseconds(step).replace(' ', '')}"
             label = f"{algorithm}, {_milliseconds(step)}"
             runs.append(NamedRun(name, label, label, scenario, refined))
-    title = with_changes(f"Convergence of {signal}, {scenario.stem}", changes)
-    return experiment_of(scenario, runs, changes=changes, title=title)
+    return experiment_of(scenario, runs, changes=changes, title=f"Convergence of {signal}, {scenario.stem}")
 
 
 def _milliseconds(step: float) -> str:

@@ -120,7 +120,7 @@ class Executor(AbstractContextManager["Executor"]):
         experiment, journaled = planned.experiment, bool(experiment.spec.axes)
         chosen = array("L", (case.number for case in experiment.cases if only(case)))
         jobs = OnDemand(chosen, planned.jobs.__getitem__)
-        outcomes = self.run(experiment.spec.title, jobs, journaled=journaled)
+        outcomes = self.run(experiment.title, jobs, journaled=journaled)
         if journaled:
             return judge_records(planned, self.journal.records)
         return judge_results(experiment, self.folder, outcomes, planned=planned, each=self.each)

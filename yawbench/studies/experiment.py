@@ -17,6 +17,7 @@ from yawbench.metrics.expressions import STANDARD, TimeWindow, metric, results_t
 from yawbench.orchestrator.plan import Override, OverrideOrigin, Plan
 from yawbench.orchestrator.results.reader import Results
 from yawbench.orchestrator.scenario import quantities
+from yawbench.orchestrator.scenario.overrides import with_changes
 from yawbench.orchestrator.scenario.schema_validation import made
 from yawbench.orchestrator.scenario.yaml_lines import dotted
 from yawbench.orchestrator.signal_names import Target
@@ -121,6 +122,11 @@ class LoadedExperiment(LoadedFile):
     """Origin of the overrides that the axes make."""
     all_repeats: int = 0
     """Number of repeats of the file if this is a quick look at a few of them, else 0."""
+
+    @property
+    def title(self) -> str:
+        """The title of the file with the overrides on the command line: numbers in it may be replaced."""
+        return with_changes(self.spec.title, self.by_options)
 
     @property
     def changed(self) -> tuple[Override, ...]:

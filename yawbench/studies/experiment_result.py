@@ -12,7 +12,7 @@ from typing import Any
 
 from yawbench.foundation.errors import Diagnostic, ResultsError
 from yawbench.foundation.messages import counted
-from yawbench.metrics.expressions import MetricValue
+from yawbench.metrics.expressions import MetricValue, metric
 from yawbench.metrics.verdict import PERCENT, Judged
 from yawbench.orchestrator.plan import Plan
 from yawbench.orchestrator.results.reader import Results
@@ -63,8 +63,8 @@ def _over_repeats(values: Sequence[MetricValue], number: int, kind: str = "mean"
         return None
     if number > 1 and kind == "share":
         return _share(values)
-    over = interval([value.number for value in values])
-    return over and MetricValue(over.mean, values[0].shown_in, over.half)
+    over, whether = interval([value.number for value in values]), number == 1 and values[0].whether
+    return over and MetricValue(over.mean, values[0].shown_in, over.half, whether=whether)
 
 
 @dataclass(frozen=True)
@@ -145,7 +145,13 @@ class ExperimentResult:
     def value(self, case: Case, key: str) -> MetricValue | None:
         """Return a metric of a case; None if the case failed or yields none."""
         numbers = self.record(case).values.get(key)
-        return None if numbers is None else MetricValue(*numbers)
+        return None if numbers is None else MetricValue(*numbers, whether=key in self.whether)
+
+    @cached_property
+    def whether(self) -> frozenset[str]:
+        """Keys of the metrics that are 0 or 1 in each run."""
+        metrics = self.spec.metrics.items()
+        return frozenset(key for key, spec in metrics if metric(spec.metric).measure.whether)
 
     def unit(self, key: str) -> str:
         """Return the unit of a metric."""

@@ -26,7 +26,7 @@ from yawbench.foundation.errors import (
     warnings_in,
 )
 from yawbench.foundation.interrupts import StopFlag, interrupts
-from yawbench.foundation.messages import printable
+from yawbench.foundation.messages import listed, printable
 from yawbench.foundation.processes import retire
 from yawbench.foundation.safe_files import reason
 from yawbench.foundation.workers import Finished, Pool
@@ -216,11 +216,24 @@ def plans_of(
             plans.add(plan)
         progress(number)
     if errors:
-        shown = list(errors.values())[:MANY]
-        more = f"and {len(errors) - MANY} more problems"
-        omitted = [Diagnostic("errors-omitted", more)] if len(errors) > MANY else []
-        raise ScenarioError([*shown, *omitted])
+        problems = _missing_once(errors.values())
+        more = f"and {len(problems) - MANY} more problems"
+        omitted = [Diagnostic("errors-omitted", more)] if len(problems) > MANY else []
+        raise ScenarioError([*problems[:MANY], *omitted])
     return plans
+
+
+def _missing_once(errors: Iterable[Diagnostic]) -> list[Diagnostic]:
+    """Return the errors; of those on the same missing FMU the first, with the other places that need it."""
+    alike: dict[Hashable, list[Diagnostic]] = {}
+    for error in errors:
+        alike.setdefault(error.message if error.code == "fmu-missing" else error, []).append(error)
+    once = []
+    for first, *others in alike.values():
+        places = [replace(other.location, target="") for other in others if other.location.file]
+        also = f" (needed also at {listed(places)})" if places else ""
+        once.append(replace(first, message=f"{first.message}{also}"))
+    return once
 
 
 def ready(jobs: Sequence[Job], **options: Any) -> list[Job]:

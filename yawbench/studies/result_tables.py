@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
-from yawbench.figures.display import DIGITS, digits_apart, digits_of, shown
+from yawbench.figures.display import DIGITS, digits_apart, digits_of, shown, shown_value
 from yawbench.metrics.expressions import MetricValue, metric
 from yawbench.metrics.verdict import Status, Verdict, VerdictText, worded
 from yawbench.orchestrator.scenario.overrides import changed
@@ -111,7 +111,7 @@ def _display_table(
 
     def number(cell: GridCell) -> str:
         value = findings.values_of_grids.get(cell.key)
-        return shown(value.number, value.shown_in, half=value.half, between=value.between) if value else "-"
+        return shown_value(value) if value else "-"
 
     def signed(cell: GridCell) -> str:
         return f"{number(cell)} {signs.get(cell.key, '')}".rstrip()
@@ -199,7 +199,7 @@ def _range(measured: Sequence[RunValue], digits: int) -> str:
     known = sorted(((one.value, one.label) for one in measured if one.value), key=lambda pair: pair[0].number)
     ends: dict[str, str] = {}
     for value, label in (*known[:1], *known[-1:]):
-        text = shown(value.number, value.shown_in, digits=digits, half=value.half, between=value.between)
+        text = shown_value(value, digits=digits)
         ends.setdefault(text, label)
     text = " to ".join(f"{number} ({label})" if label else number for number, label in ends.items())
     return " and ".join(filter(None, [text, "no result" if len(known) < len(measured) else ""]))

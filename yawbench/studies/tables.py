@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from yawbench.events.kinds import events_in
 from yawbench.events.why import lost_among
-from yawbench.figures.display import shown
+from yawbench.figures.display import shown_value
 from yawbench.figures.latex import escaped
 from yawbench.foundation.errors import text_of
 from yawbench.foundation.messages import printable
@@ -147,7 +147,7 @@ def _shown(cell: Cell, unit: str = "") -> str:
     if isinstance(cell, int):
         return str(cell)
     value = cell if isinstance(cell, MetricValue) else MetricValue(cell, unit or "1")
-    return shown(value.number, value.shown_in, half=value.half, between=value.between)
+    return shown_value(value)
 
 
 def for_terminal(table: Table) -> TerminalTable:

@@ -241,7 +241,7 @@ def sample_tables(
     tables, only = [], [*keys]
     for name, rows in _rows(findings, names).items():
         for key in dict.fromkeys(row.of for row in rows):
-            if (key in only or not only) and not (name == "statistics" and _whether(findings, key)):
+            if (key in only or not only) and not (name == "statistics" and key in findings.whether):
                 shown = SAMPLE_TABLES[name][1]
                 tables.append(shown(findings, key, [row for row in rows if row.of == key]))
     return [table for table in tables if table.rows]
@@ -327,7 +327,7 @@ def _statistics(findings: ExperimentResult, groups: Sequence[Group]) -> Iterator
     for group in groups:
         for key in findings.spec.metrics:
             numbers, missing = _finite(findings, group, key)
-            share = _whether(findings, key) and len(numbers)
+            share = key in findings.whether and len(numbers)
             average = probability(int(numbers.sum()), len(numbers)) if share else mean(numbers)
             moments = {"mean": average, "deviation": deviation(numbers)}
             counts: dict[str, str | int] = {"runs": len(numbers), "missing": missing}
@@ -346,11 +346,6 @@ def _shown_statistics(findings: ExperimentResult, key: str, rows: Sequence[_Row]
             if missing:
                 table.notes = ["runs without a number are not in these numbers"]
     return table
-
-
-def _whether(findings: ExperimentResult, key: str) -> bool:
-    """Return whether a metric is 0 or 1 in each run."""
-    return metric(findings.spec.metrics[key].metric).measure.whether
 
 
 def holding(findings: ExperimentResult, group: Group, name: str) -> tuple[int, int, int]:
@@ -375,7 +370,7 @@ def holding(findings: ExperimentResult, group: Group, name: str) -> tuple[int, i
 def _probabilities(findings: ExperimentResult, groups: Sequence[Group]) -> Iterator[_Row]:
     """Yield rows of conditions, and of metrics that are 0 or 1."""
     spec = findings.spec
-    happening = (key for key in spec.metrics if _whether(findings, key))
+    happening = (key for key in spec.metrics if key in findings.whether)
     for name in dict.fromkeys((*spec.probabilities, *happening)):
         for group in groups:
             count, missing, number = holding(findings, group, name)
