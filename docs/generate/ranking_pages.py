@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from functools import cache, cached_property, partial
 from pathlib import Path
 from statistics import fmean, geometric_mean, median
+from typing import Any, NamedTuple
 
 from yawbench.foundation.messages import in_text, listed
 from yawbench.ranking import ranking_page
@@ -275,15 +276,28 @@ def names(scores: Iterable[EntryScore]) -> str:
     return listed([in_text(score.spec.title) for score in scores]) or "none"
 
 
-def tuned_gains() -> Table:
-    """Return the objective of the common search, law by law, the least first."""
+class Tuned(NamedTuple):
+    """What the common search has found for a law: its objective, that amid the ranges, the parameters."""
+
+    least: float
+    amid: float
+    parameters: Mapping[str, Any]
+
+
+def tuned_laws() -> dict[str, Tuned]:
+    """Return law -> what the common search has found, the least objective first."""
     ranking = load_ranking(matrix_tables.FILE)
-    found = []
+    found = {}
     for spec, _ in ranking.entries.values():
         if told := re.search(r"cost ([\d.]+), ([\d.]+) amid the ranges", spec.source):
             least, amid = map(float, told.groups())
-            found.append((least, amid, spec.title.removeprefix("tuned ")))
-    rows = [[law, f"{amid:.1f}", f"{least:.1f}"] for least, amid, law in sorted(found)]
+            found[spec.title.removeprefix("tuned ")] = Tuned(least, amid, spec.parameters)
+    return dict(sorted(found.items(), key=lambda one: one[1][:2]))
+
+
+def tuned_gains() -> Table:
+    """Return the objective of the common search, law by law, the least first."""
+    rows = [[law, f"{tuned.amid:.1f}", f"{tuned.least:.1f}"] for law, tuned in tuned_laws().items()]
     return Table("", ["law", "study gains, 10 kN.m", "tuned"], [*rows], numbers={1, 2})
 
 
