@@ -84,6 +84,15 @@ class Matrix:
         return dict(sorted(found.items(), key=lambda one: -one[1]))
 
     @property
+    def runs(self) -> int:
+        """How many runs the ranking makes: matrix, settings, ordinary driving."""
+        cells = [score.cells.values() for score in self.result.scores]
+        cells += [score.cells.values() for one in self.result.settings if one.name for score in one.scores]
+        made = sum(cell.counts[1] for row in cells for cell in row)
+        ordinary = self.result.nuisance.scores.values() if self.result.nuisance else ()
+        return made + sum(len(score.runs) for score in ordinary)
+
+    @property
     def better(self) -> int:
         """How many laws are clearly better than no control by the conditions passed."""
         placed = [score for score in self.result.scores if score.place]
