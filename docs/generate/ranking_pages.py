@@ -13,7 +13,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from functools import cache, cached_property, partial
 from pathlib import Path
-from statistics import fmean, geometric_mean, median
+from statistics import fmean, geometric_mean, median, variance
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -322,6 +322,13 @@ class Threats:
         """Law and rise of its mean level by tuning, mean over seeds, the largest first."""
         rise = {law: fmean(tuned) - study for law, (study, *tuned) in self.gains.means.items()}
         return sorted(rise.items(), key=lambda one: -one[1])
+
+    @property
+    def luckiest(self) -> tuple[str, float]:
+        """The law whose level depends most on the seed of the search, and its share of that variance."""
+        found = {law: variance(tuned) for law, (_, *tuned) in self.gains.means.items()}
+        law = max(found, key=lambda name: found[name])
+        return law, found[law] / sum(found.values())
 
     def surviving(self, threat: str) -> list[str]:
         """Return the entries that survive a threat to the hard end on every car."""
