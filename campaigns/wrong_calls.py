@@ -258,6 +258,7 @@ def _parameters() -> Iterator[Parameter]:
     yield of("within.function", lambda x: yb.within(60, x), "function",
              skip={"type", "lambda of x", "builtin type method"},  # raise their own errors
              right={"class", "class of ours", "lambda", "lambda of all", "builtin"})  # fmt: skip
+    yield of("within.arguments", lambda x: yb.within(60, id, x), right=set(WRONG))
     yield of("view.runs", lambda x: yb.view(x), "runs", "a viewer shows")
     yield of("view.runs [run]", lambda x: yb.view({"a": x}), "runs")
     yield of("view.panels", lambda x: yb.view(b.run, x), "panel")

@@ -563,9 +563,13 @@ def call_in_copy(function: Callable[..., Any], arguments: Sequence[Any], limit: 
     """
     copy = _Copy(partial(_answer_call, function, arguments), limit)
     try:
-        value, error = copy.hear("answer")
+        answer, said = copy.hear("answer")
     finally:
         copy.close(kill=True)
+    try:
+        value, error = pickle.loads(answer)
+    except Exception as unknown:  # of a class that only the copy has, such as of a module imported there
+        raise RuntimeError(said) if said else unknown from None
     if error is not None:
         raise error
     return value
@@ -592,11 +596,13 @@ class _Copy(Process):
 
 def _answer_call(function: Callable[..., Any], arguments: Sequence[Any], commands: int, answers: int) -> None:
     """Call a function in this process, which has been forked for it, and send its value."""
-    channel = Channel(commands, answers)
+    said = ""
     try:
-        channel.send("answer", (function(*arguments), None))
+        answer = pickle.dumps((function(*arguments), None))
     except Exception as error:
-        channel.send("answer", (None, _portable(error)))
+        said = "".join(traceback.format_exception(error))
+        answer = pickle.dumps((None, _portable(error)))
+    Channel(commands, answers).send("answer", (answer, said))
 
 
 def pickled(content: Any, reduce: Callable[[SentOnce], tuple[Any, ...]]) -> bytes:

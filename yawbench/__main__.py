@@ -7,7 +7,7 @@ import sys
 def main() -> None:
     """Run the command line; help and version of the program need nothing of it."""
     if "_YAWBENCH_COMPLETE" not in os.environ and {*sys.argv[1:2]} <= {"--version", "-h", "--help"}:
-        from .overview import answer
+        from .command_help import answer
 
         if (text := answer(sys.argv[1:])) is not None:
             try:

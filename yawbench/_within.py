@@ -29,7 +29,8 @@ def within(limit: float, function: Callable[..., Any], *arguments: Any) -> Any:
 
     Raises:
         YawbenchError: it did not return in time, or ended its process.
-        Exception: raised by the function; as a `RuntimeError` with its traceback if it cannot be pickled.
+        Exception: raised by the function; as a `RuntimeError` with its traceback if it cannot be pickled, or
+            if its class is one of the copy alone.
     """
     with checked.as_scenario_errors():
         seconds = checked.number(limit, "limit")

@@ -27,7 +27,7 @@ from yawbench.foundation.errors import (
 from yawbench.foundation.interrupts import terminable
 from yawbench.foundation.messages import cut, printable
 
-from . import overview
+from . import command_help
 from .commands import output
 
 COMPLETION = "_YAWBENCH_COMPLETE"
@@ -99,7 +99,7 @@ def _application(arguments: Sequence[str] = (), *, whole: bool = False) -> typer
         no_args_is_help=True,
         pretty_exceptions_enable=False,
         rich_markup_mode=None,
-        context_settings={"help_option_names": [*overview.HELP]},
+        context_settings={"help_option_names": [*command_help.HELP]},
     )
     app.callback()(_options)
     for name in called if alone else plugins.names("command"):
@@ -107,7 +107,7 @@ def _application(arguments: Sequence[str] = (), *, whole: bool = False) -> typer
             command = plugins.find("command", name)
             app.command(name)(output.with_forms(command) if hasattr(command, "tabular") else command)
         else:
-            app.command(name, help=overview.first_line(name))(_nothing)
+            app.command(name, help=command_help.first_line(name))(_nothing)
     return app
 
 
@@ -117,7 +117,7 @@ def _nothing() -> None:
 
 def _print_version(requested: bool) -> None:
     if requested:
-        typer.echo(overview.answer(["--version"]))
+        typer.echo(command_help.answer(["--version"]))
         raise typer.Exit
 
 
@@ -130,7 +130,7 @@ def _options(
     pass
 
 
-_options.__doc__ = overview.ABOUT
+_options.__doc__ = command_help.ABOUT
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -167,7 +167,7 @@ def _status(arguments: Sequence[str]) -> int:
         try:
             with _interruptible(), warnings.catch_warnings():
                 hide_library_warnings()
-                if COMPLETION not in os.environ and (text := overview.answer(arguments)) is not None:
+                if COMPLETION not in os.environ and (text := command_help.answer(arguments)) is not None:
                     print(text)
                     return 0
                 _application(arguments)(arguments)

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import fnmatch
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -29,7 +29,9 @@ from yawbench.studies.result_files import RECORD, VERDICTS
 from yawbench.studies.result_tables import NO_FLIP, flip_words, share, share_words
 from yawbench.vocabulary.gravity import G
 
+from .esc_times import times_of
 from .published import replaced, rows_in
+from .ranking_pages import tuned_laws
 from .templates import DOCS, reflowed, rendered, row, rule
 
 SCENARIOS = DOCS.parent / "scenarios"
@@ -42,12 +44,24 @@ STUDIES = {
     "D": "fuzzy_feedback/study",
 }
 """Name in templates -> study with a region, in the order of the report."""
-OTHERS = {"laws": "fnn_sideslip/laws", "esc": "proving_ground/esc"}
-"""Studies without claims on a paper, likewise."""
+OTHERS = {
+    "laws": "fnn_sideslip/laws",
+    "esc": "proving_ground/esc",
+    **{
+        name: f"{name}/study"
+        for name in (
+            "feedforward_pi", "super_twisting", "integral_sliding_mode", "internal_model", "lqg",
+            "phase_plane", "steering_and_braking", "gain_scheduled", "envelope_mpc", "weighted_least_squares",
+        )
+    },
+}  # fmt: skip
+"""Studies without a region, likewise."""
 DIGITS = 6
 """Significant digits of recorded numbers; chosen: pages show three."""
 SEEDS = SCENARIOS / "fnn_sideslip" / "tuning_seeds.csv"
 """Least objective of paper A's four laws that searches with several seeds have found."""
+MEASURED: Mapping[str, Callable[[Path], Mapping[str, Mapping[str, float]]]] = {"esc": times_of}
+"""Study -> what is measured in the results of its runs, beside its metrics."""
 KINDS = tuple(
     worded(status, "claims") for status in (Status.PASSED, Status.FAILED, Status.SENSITIVE, Status.UNDECIDED)
 )
@@ -93,11 +107,13 @@ class Numbers:
         runs: run -> metric -> value [SI].
         derived: numbers derived from several runs [SI].
         claims: of the paper, in the study's order.
+        verdicts: of a study without a region: what a claim says -> its verdicts, one for each set of runs.
     """
 
     runs: Mapping[str, Mapping[str, float]]
     derived: Mapping[str, float]
     claims: tuple[Claim, ...]
+    verdicts: Mapping[str, list[str]]
 
     def __getitem__(self, run: str) -> Mapping[str, float]:
         """Return the metrics of a run."""
@@ -106,6 +122,11 @@ class Numbers:
     def claim(self, words: str) -> Claim:
         """Return the claim that has these words; it must be one."""
         (one,) = (claim for claim in self.claims if words in claim.says)
+        return one
+
+    def judged(self, words: str) -> list[str]:
+        """Return the verdicts of the claim that has these words, in a study without a region."""
+        (one,) = (verdicts for says, verdicts in self.verdicts.items() if words in says)
         return one
 
     def at_speed(self, words: str, speed: int) -> Claim:
@@ -134,32 +155,44 @@ def recorded() -> dict[str, Numbers]:
     """Return name of a study -> its recorded numbers."""
     found = json.loads(FILE.read_text(encoding="utf-8"))
     return {
-        name: Numbers(one["runs"], one["derived"], tuple(Claim(**claim) for claim in one["claims"]))
+        name: Numbers(
+            one["runs"],
+            one["derived"],
+            tuple(Claim(**claim) for claim in one["claims"]),
+            one.get("verdicts", {}),
+        )
         for name, one in found.items()
     }
 
 
-def numbers_of(folder: Path) -> Numbers:
+def numbers_of(folder: Path, name: str = "") -> Numbers:
     """Return the numbers of a study from the results that it has left in a folder.
 
     Runs that were not made are left out.
+
+    Args:
+        folder: the results.
+        name: of the study in templates, for what is measured beside its metrics.
     """
     found = json.loads((folder / RECORD).read_text(encoding="utf-8"))
     claims = list[Claim]()
     if (folder / VERDICTS).is_file():
         rows = rows_in(folder / VERDICTS)
         claims = [_claim(row) for row in rows if row["group"] == "claims" and row["points"]]
-    return Numbers(
-        {
-            name: {
-                key: _rounded(one["value"]) for key, one in run["metrics"].items() if one["value"] is not None
-            }
-            for name, run in found["runs"].items()
-            if run["metrics"]
-        },
-        {key: _rounded(one["value"]) for key, one in found["derived"].items() if one["value"] is not None},
-        tuple(claims),
-    )
+    runs = {
+        run: {key: _rounded(one["value"]) for key, one in of["metrics"].items() if one["value"] is not None}
+        for run, of in found["runs"].items()
+        if of["metrics"]
+    }
+    for run, measured in MEASURED[name](folder).items() if name in MEASURED else ():
+        runs[run] |= {key: _rounded(value) for key, value in measured.items()}
+    verdicts: dict[str, list[str]] = {}
+    for one in found["claims"] if not claims else ():
+        verdicts.setdefault(one["says"], []).append(one["verdict"])
+    derived = {
+        key: _rounded(one["value"]) for key, one in found["derived"].items() if one["value"] is not None
+    }
+    return Numbers(runs, derived, tuple(claims), verdicts)
 
 
 def _claim(row: Mapping[str, str]) -> Claim:
@@ -180,7 +213,9 @@ def record(name: str, numbers: Numbers) -> None:
     """Write the numbers of a study into the record, the others as they are."""
     found = json.loads(FILE.read_text(encoding="utf-8")) if FILE.is_file() else {}
     claims = [claim._asdict() for claim in numbers.claims]
-    found[name] = {"runs": numbers.runs, "derived": numbers.derived, "claims": claims}
+    found[name] = {
+        "runs": numbers.runs, "derived": numbers.derived, "claims": claims, "verdicts": numbers.verdicts
+    }  # fmt: skip
     parts = []
     for study in (*STUDIES, *OTHERS):
         if study not in found:
@@ -188,9 +223,11 @@ def record(name: str, numbers: Numbers) -> None:
         one = found[study]
         runs = ",\n".join(f"   {json.dumps(run)}: {json.dumps(of)}" for run, of in one["runs"].items())
         told = ",\n".join(f"   {json.dumps(claim, ensure_ascii=False)}" for claim in one["claims"])
+        verdicts = json.dumps(one.get("verdicts", {}), ensure_ascii=False)
         parts.append(
             f' {json.dumps(study)}: {{\n  "runs": {{\n{runs}\n  }},\n'
-            f'  "derived": {json.dumps(one["derived"])},\n  "claims": [\n{told}\n  ]\n }}'
+            f'  "derived": {json.dumps(one["derived"])},\n  "claims": [\n{told}\n  ],\n'
+            f'  "verdicts": {verdicts}\n }}'
         )
     FILE.write_text("{\n" + ",\n".join(parts) + "\n}\n", encoding="utf-8")
 
@@ -226,17 +263,19 @@ def levels_words(name: str) -> str:
 def pages_with_numbers() -> dict[Path, str]:
     """Return the pages that have a template, and the sentences in others, written anew."""
     found = recorded()
-    pages = rendered(
-        "*.md.jinja",
-        {
-            **found, "studies": {name: found[name] for name in STUDIES}, "study_of": study_of, "kinds": KINDS,
-            "levels_words": levels_words, "paths": STUDIES, "totals": totals(found),
-            "seeds": found_by_seeds(), "first_of": first_of, "tail": TAIL,
-            "braking_distance": lambda speed, friction: speed**2 / (2.0 * friction * G),
-            "lifts": G * PaperA.track_width / (2.0 * PaperA.cg_height),
-        },
-    )  # fmt: skip
-    for page, name, text in sentences(found):
+    names = {
+        **found, "studies": {name: found[name] for name in STUDIES}, "study_of": study_of, "kinds": KINDS,
+        "levels_words": levels_words, "paths": STUDIES, "totals": totals(found), "tuned": tuned_laws(),
+        "seeds": found_by_seeds(), "first_of": first_of, "tail": TAIL,
+        "braking_distance": lambda speed, friction: speed**2 / (2.0 * friction * G),
+        "lifts": G * PaperA.track_width / (2.0 * PaperA.cg_height),
+    }  # fmt: skip
+    pages = rendered("*.md.jinja", names)
+    parts = [
+        (DOCS / "theory" / page.name, "studies", text)
+        for page, text in rendered("theory/*.md.jinja", names).items()
+    ]
+    for page, name, text in [*sentences(found), *parts]:
         pages[page] = replaced(
             pages.get(page) or page.read_text(encoding="utf-8"), name, reflowed(text).strip()
         )
@@ -269,6 +308,20 @@ def totals(found: Mapping[str, Numbers]) -> Totals:
     return Totals(sum(counts), *counts)
 
 
+def verdicts_words(of: Totals, leave: str) -> str:
+    """Return in words how many claims have which verdict."""
+    return (
+        f"{of.holds} {_verb(of.holds, 'holds', 'hold')} and {of.fails} "
+        f"{_verb(of.fails, 'does not reproduce', 'do not reproduce')} over more than nine tenths of what the "
+        f"{leave} open, {of.depends} {_verb(of.depends, 'depends', 'depend')} on it, {of.undecided} "
+        f"{_verb(of.undecided, 'is', 'are')} undecided"
+    )
+
+
+def _verb(number: int, one: str, many: str) -> str:
+    return one if number == 1 else many
+
+
 PAPERS = {
     "a": (("A",), "sideslip, by a fuzzy neural network that learns online"),
     "b": (
@@ -288,10 +341,7 @@ def sentences(found: Mapping[str, Numbers]) -> list[tuple[Path, str, str]]:
         paper: [sum(of) for of in zip(*(found[name].counts() for name in names), strict=True)]
         for paper, (names, _) in PAPERS.items()
     }
-    told = (
-        "{} claims of four papers, {} hold and {} do not reproduce over more than nine tenths of what the "
-        "papers leave open, {} depend on it, {} are undecided"
-    ).format(*every)
+    told = f"{every.claims} claims of four papers, {verdicts_words(every, 'papers leave')}"
     lines = [
         row(("paper", "controlled variable and method", "claims", *KINDS)),
         rule(3 + len(KINDS), 1 + len(KINDS)),
@@ -300,10 +350,6 @@ def sentences(found: Mapping[str, Numbers]) -> list[tuple[Path, str, str]]:
             for paper, counts in counted.items()
         ),
     ]
-    words = (
-        "of {} claims {} hold and {} do not reproduce over more than nine tenths of what the paper leaves "
-        "open, {} depend on it, {} are undecided"
-    )
     return [
         (
             DOCS.parent / "README.md",
@@ -319,8 +365,8 @@ def sentences(found: Mapping[str, Numbers]) -> list[tuple[Path, str, str]]:
             (
                 DOCS / "theory" / f"paper_{paper}.md",
                 "verdicts",
-                f"**Result**: {words.format(sum(counts), *counts)} ([verdicts](../verdicts.md), "
-                "[in detail](../papers.md)).",
+                f"**Result**: of {sum(counts)} claims {verdicts_words(Totals(0, *counts), 'paper leaves')} "
+                "([verdicts](../verdicts.md), [in detail](../papers.md)).",
             )
             for paper, counts in counted.items()
         ),

@@ -9,11 +9,14 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from functools import cache, cached_property, partial
 from pathlib import Path
-from statistics import fmean, geometric_mean, median
+from statistics import fmean, geometric_mean, median, variance
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from yawbench.foundation.messages import in_text, listed
 from yawbench.ranking import ranking_page
@@ -21,7 +24,7 @@ from yawbench.ranking.disciplines import disciplines
 from yawbench.ranking.gains_and_laws import ComparedGains, compared_gains
 from yawbench.ranking.nuisance import nuisance_sentence
 from yawbench.ranking.ranking import load_ranking
-from yawbench.ranking.ranking_scores import IDLE, EntryScore, RankedState
+from yawbench.ranking.ranking_scores import IDLE, EntryScore, RankedState, apart_by_conditions
 from yawbench.ranking.settings import settings_sentence
 from yawbench.ranking.threat_runs import Survived, ThreatResult, published_result
 from yawbench.ranking.threat_scores import (
@@ -35,7 +38,7 @@ from yawbench.ranking.threat_scores import (
 from yawbench.ranking.threat_tables import titles_of
 from yawbench.ranking.threats import REFERENCE, SearchPlace, load_threats
 from yawbench.ranking.whole import WholeRanking
-from yawbench.studies.confidence import CONFIDENCE
+from yawbench.studies.confidence import CONFIDENCE, sign_test
 from yawbench.studies.tables import Table
 
 from . import matrix_tables, threat_tables
@@ -60,6 +63,124 @@ class Matrix:
         self.means = markdown(matrix_tables.numbers(result))
         self.seeds = matrix_tables.seeds_sentence(result)
 
+    @property
+    def sharing(self) -> int:
+        """How many entries share the first place."""
+        return sum(score.place == 1 for score in self.result.scores)
+
+    @property
+    def clear(self) -> int:
+        """How many pairs of laws are clearly different by the conditions passed."""
+        return int(apart_by_conditions(self.laws).better.sum())
+
+    @property
+    def alone(self) -> dict[str, int]:
+        """Title of a law -> of how many pairs with it one is better, each pair taken alone; those of most."""
+        alone = apart_by_conditions(self.laws).alone
+        found = {
+            in_text(score.spec.title): int(alone[k].sum() + alone[:, k].sum())
+            for k, score in enumerate(self.laws)
+        }
+        return dict(sorted(found.items(), key=lambda one: -one[1]))
+
+    @property
+    def runs(self) -> int:
+        """How many runs the ranking makes: matrix, settings, ordinary driving."""
+        cells = [score.cells.values() for score in self.result.scores]
+        cells += [score.cells.values() for one in self.result.settings if one.name for score in one.scores]
+        made = sum(cell.counts[1] for row in cells for cell in row)
+        ordinary = self.result.nuisance.scores.values() if self.result.nuisance else ()
+        return made + sum(len(score.runs) for score in ordinary)
+
+    @property
+    def better(self) -> int:
+        """How many laws are clearly better than no control by the conditions passed."""
+        placed = [score for score in self.result.scores if score.place]
+        idle = [score.spec.fmu == IDLE for score in placed]
+        return int(apart_by_conditions(placed).better[:, idle].sum())
+
+    @property
+    def steering(self) -> list[str]:
+        """The entries whose controllers steer, too."""
+        steers = {
+            f"controller_{file.stem}"
+            for file in (DOCS.parent / "components" / "controllers").glob("*.py")
+            if "added_steer_angle_request" in file.read_text(encoding="utf-8")
+        }
+        return [score.entry for score in self.laws if score.spec.fmu in steers]
+
+    @property
+    def sharing_out(self) -> list[str]:
+        """The entries with an allocator of their own."""
+        return [score.entry for score in self.laws if "allocator" in score.spec.swap]
+
+    def named(self, entries: Iterable[str]) -> str:
+        """Return entries' titles as a list in a sentence."""
+        return names(score for score in self.laws if score.entry in entries)
+
+    @property
+    def pairs_alone(self) -> int:
+        """Of how many pairs of laws one is better by the conditions passed, each pair taken alone."""
+        return int(apart_by_conditions(self.laws).alone.sum())
+
+    @property
+    def needed(self) -> int:
+        """By how many conditions that only one of two passes the first pair is told apart, of all pairs."""
+        bound = (1.0 - CONFIDENCE) / self.pairs
+        return next(n for n in range(1, 1000) if sign_test(n, 0) < bound)
+
+    @property
+    def most_passed(self) -> int:
+        """How many conditions the first of the order passes."""
+        return self.laws[0].count(RankedState.PASSED)
+
+    @property
+    def fewest(self) -> EntryScore:
+        """The law that passes the fewest conditions."""
+        return min(self.laws, key=lambda score: score.count(RankedState.PASSED))
+
+    def title(self, score: EntryScore) -> str:
+        """Return an entry's title inside a sentence."""
+        return in_text(score.spec.title)
+
+    def passed(self, score: EntryScore) -> int:
+        """Return how many conditions an entry passes."""
+        return score.count(RankedState.PASSED)
+
+    @property
+    def brakings(self) -> list[float]:
+        """Shares of ordinary driving in which laws brake."""
+        return [score.braking for score in self.laws if score.braking is not None]
+
+    def braking_of(self, entry: str) -> float:
+        """Return the share of ordinary driving in which a law brakes."""
+        return next(score.braking or 0.0 for score in self.laws if score.entry == entry)
+
+    @property
+    def twice(self) -> list[str]:
+        """FMUs of the laws that are ranked with both gains."""
+        return [score.spec.fmu for score in self.laws if score.spec.gains == "tuned"]
+
+    def by_regulation(self, score: EntryScore) -> int:
+        """Return how many conditions an entry passes by the regulation's criteria alone."""
+        return score.count(RankedState.PASSED) + score.count(RankedState.SPUN)
+
+    def meeting(self, condition: str) -> int:
+        """Return how many laws meet the regulation's criteria in a condition, whatever the sideslip."""
+        states = (RankedState.PASSED, RankedState.SPUN)
+        return sum(score.cells[condition].state in states for score in self.laws)
+
+    @property
+    def told_apart(self) -> dict[str, int]:
+        """Column of the table for choosing a law -> how many pairs it tells apart, the most first."""
+        choosing = ranking_page.beside_matrix(self.result)[0]
+        counts = {
+            heading.partition(" [")[0]: int(str(cell).split()[0])
+            for heading, cell in zip(choosing.headings[1:], choosing.rows[-1][1:], strict=True)
+            if cell is not None
+        }
+        return dict(sorted(counts.items(), key=lambda one: -one[1]))
+
     def passing(self, condition: str) -> str:
         """Return the titles of the laws that pass a condition."""
         return names(score for score in self.laws if score.cells[condition].passed)
@@ -81,6 +202,15 @@ class Matrix:
     def braking(self, most: float) -> str:
         """Return the titles of the laws that brake for at most a share of ordinary driving."""
         return names(score for score in self.laws if score.braking is not None and score.braking <= most)
+
+    def calmer(self, fmus: Iterable[str]) -> int:
+        """Return how many laws, by their FMUs, brake less in ordinary driving with tuned gains."""
+        found = {
+            (score.spec.fmu, score.spec.gains): score.braking or 0.0
+            for score in self.laws
+            if not score.spec.swap
+        }
+        return sum(found[fmu, "tuned"] < found[fmu, "authors"] for fmu in fmus)
 
     def braking_mean(self, gains: str) -> float:
         """Return the mean share of ordinary driving in which laws brake, of those with both gains."""
@@ -132,6 +262,11 @@ class Threats:
         """How many entries share the first place, beside the first."""
         return sum(score.place == 1 for score in self.scores.scores) - 1
 
+    @property
+    def behind(self) -> list[str]:
+        """The entries that do not share the first place."""
+        return [score.entry for score in self.scores.scores if score.place > 1]
+
     @cached_property
     def others_first(self) -> dict[str, str]:
         """Threat or car left out -> entry that is first then, where it is another."""
@@ -160,10 +295,40 @@ class Threats:
         return [law for law, p in self.gains.helped.items() if p[corrected] < 1.0 - CONFIDENCE]
 
     @property
+    def lower(self) -> list[str]:
+        """FMUs of the laws whose mean level is lower tuned than with the gains of the study."""
+        entries = self.threats.ranking.entries
+        return [entries[law][0].fmu for law, rise in self.rises if rise < 0.0]
+
+    def spreads(self) -> list[tuple[str, float]]:
+        """Return threat and standard deviation of laws' mean levels [1 = its range], the largest first."""
+        main = self.threats.main
+        laws = [entry for entry in self.entries if entry != REFERENCE]
+        positions = np.nanmean(self.result.positions(main, laws), axis=2)
+        threats = self.threats.threats_in(main)
+        found = {
+            self.threats.spec.threats[name].short or self.threats.spec.threats[name].title: float(spread)
+            for name, spread in zip(threats, positions.std(axis=0, ddof=1), strict=True)
+        }
+        return sorted(found.items(), key=lambda one: -one[1])
+
+    def alike(self, threat: str) -> int:
+        """Return how many entries survive the same level of a threat, of those that most survive."""
+        levels = [f"{self.mean_level(threat, entry):.3g}" for entry in self.entries]
+        return max(map(levels.count, levels))
+
+    @property
     def rises(self) -> list[tuple[str, float]]:
         """Law and rise of its mean level by tuning, mean over seeds, the largest first."""
         rise = {law: fmean(tuned) - study for law, (study, *tuned) in self.gains.means.items()}
         return sorted(rise.items(), key=lambda one: -one[1])
+
+    @property
+    def luckiest(self) -> tuple[str, float]:
+        """The law whose level depends most on the seed of the search, and its share of that variance."""
+        found = {law: variance(tuned) for law, (_, *tuned) in self.gains.means.items()}
+        law = max(found, key=lambda name: found[name])
+        return law, found[law] / sum(found.values())
 
     def surviving(self, threat: str) -> list[str]:
         """Return the entries that survive a threat to the hard end on every car."""
@@ -179,11 +344,10 @@ class Threats:
         """Return the level of a threat that an entry survives, geometric mean over cars."""
         return geometric_mean(self.levels(threat, entry))
 
-    def more_robust(self, one: str, other: str, threat: str) -> str:
-        """Return which of two entries survives more of a threat."""
-        spec = self.threats.spec.threats[threat]
-        sign = 1.0 if spec.hard > spec.easy else -1.0
-        return max(one, other, key=lambda entry: sign * self.mean_level(threat, entry))
+    def level_on(self, threat: str, entry: str, car: str) -> float:
+        """Return the level of a threat that an entry survives with a car."""
+        place = SearchPlace(self.threats.main, threat, car, entry)
+        return self.threats.spec.threats[threat].level(self.result.survived[place].position)
 
     def differ(self, one: str, other: str) -> bool:
         """Return whether two entries are clearly different."""
@@ -254,6 +418,21 @@ class Threats:
             if math.degrees(self.median("braking", entry, "yaw_angle")) < 2.0
         ]
 
+    def better_than_none(self, title: str) -> int:
+        """Return how many controllers are clearly better than no control in a discipline."""
+        (scores,) = (test.scores for test in disciplines(self.result) if test.title == title)
+        order = scores.order()
+        return int(scores.apart.better[:, order.index(REFERENCE)].sum())
+
+    def between(self, most: float) -> str:
+        """Return the law that stops shortest on split friction and turns by at most an angle [°]."""
+        laws = [
+            entry
+            for entry in self.entries
+            if math.degrees(self.median("braking", entry, "yaw_angle")) <= most
+        ]
+        return min(laws, key=lambda entry: self.median("braking", entry, "distance"))
+
     def firmest(self, number: int) -> list[str]:
         """Return the laws that a gust of wind pushes least aside."""
         return sorted(self.entries, key=lambda entry: self.median("wind", entry, "deviation"))[:number]
@@ -275,15 +454,28 @@ def names(scores: Iterable[EntryScore]) -> str:
     return listed([in_text(score.spec.title) for score in scores]) or "none"
 
 
-def tuned_gains() -> Table:
-    """Return the objective of the common search, law by law, the least first."""
+class Tuned(NamedTuple):
+    """What the common search has found for a law: its objective, that amid the ranges, the parameters."""
+
+    least: float
+    amid: float
+    parameters: Mapping[str, Any]
+
+
+def tuned_laws() -> dict[str, Tuned]:
+    """Return law -> what the common search has found, the least objective first."""
     ranking = load_ranking(matrix_tables.FILE)
-    found = []
+    found = {}
     for spec, _ in ranking.entries.values():
         if told := re.search(r"cost ([\d.]+), ([\d.]+) amid the ranges", spec.source):
             least, amid = map(float, told.groups())
-            found.append((least, amid, spec.title.removeprefix("tuned ")))
-    rows = [[law, f"{amid:.1f}", f"{least:.1f}"] for least, amid, law in sorted(found)]
+            found[spec.title.removeprefix("tuned ")] = Tuned(least, amid, spec.parameters)
+    return dict(sorted(found.items(), key=lambda one: one[1][:2]))
+
+
+def tuned_gains() -> Table:
+    """Return the objective of the common search, law by law, the least first."""
+    rows = [[law, f"{tuned.amid:.1f}", f"{tuned.least:.1f}"] for law, tuned in tuned_laws().items()]
     return Table("", ["law", "study gains, 10 kN.m", "tuned"], [*rows], numbers={1, 2})
 
 

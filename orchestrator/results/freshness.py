@@ -57,7 +57,8 @@ def _made_of(fmu: Fmu) -> str:
     """Return a hash of what an FMU computes by: of its sources if it is built of them, else of the archive.
 
     A component that was built in a hurry runs in Python, and later as native code that was compared with it:
-    its archive is another then, but neither its sources nor its results.
+    its archive is another then, but neither its sources nor its results. That it is built of them is what its
+    stamp says: an archive that was edited since, with its stamp kept, passes for one that was not.
     """
     if fmu.built is None or not fmu.built.current:
         return fmu.sha256

@@ -16,7 +16,7 @@ import typer
 from tests.checkout import ROOT, run_in
 from tests.command_line import status_of
 from tests.refusals import each_mentions, mentions
-from yawbench import cli, overview
+from yawbench import cli, command_help
 from yawbench.cli import _application
 from yawbench.foundation import plugins
 from yawbench.foundation.errors import Interrupted, ScenarioError
@@ -45,12 +45,12 @@ def test_help_and_version_import_nothing_of_what_they_tell():
 
 
 def test_the_overview_has_every_command_with_the_first_line_of_its_docstring():
-    grouped = [name for names in overview.GROUPS.values() for name in names]
+    grouped = [name for names in command_help.GROUPS.values() for name in names]
     assert len(grouped) == len({*grouped}) and {*grouped} <= {*plugins.names("command")}
-    text = " ".join(overview.overview().split())
+    text = " ".join(command_help.overview().split())
     for name in plugins.names("command"):
         line = (plugins.find("command", name).__doc__ or "").splitlines()[0]
-        assert overview.first_line(name) == line
+        assert command_help.first_line(name) == line
         assert f"{name} {line}" in text
 
 

@@ -100,7 +100,7 @@ def test_wrong_baselines_and_time_spans_are_refused(run, capsys):
         ("--minus", "others"): ("--minus others", "other"),
         ("--minus", "run", "--page"): ("--minus", "page", "baseline"),
         ("--minus", "run", "--panel", "path"): ("--minus", "path", "position_y"),
-        ("--during", "soon"): ("--during", "soon", "from 1 s to 3 s"),
+        ("--during", "soon"): ("--during", "soon", "1 to 3 s"),
         ("--during", "at 2 s"): ("--during", "at 2 s", "1 to 3 s"),
         ("--during", "90 to 95 s"): ("run", "nothing", "90", "95 s"),
         ("--during", "1 to 2 s", "--page"): ("--during", "page"),

@@ -43,6 +43,7 @@ BO_ 417 Wheels: 4 SENSORS
  SG_ FrontLeft : 0|16@1+ (0.01,0) [0|300] "km/h" ESP
 BO_ 2147484066 Pressures: 2 SENSORS
  SG_ FrontLeft : 0|12@1+ (0.1,0) [0|0] "bar" ESP
+ SG_ Valid : 12|1@1+ (1,0) [0|1] "bar" ESP
 BA_DEF_ BO_ "GenMsgCycleTime" INT 0 65535;
 BA_DEF_DEF_ "GenMsgCycleTime" 0;
 BA_ "GenMsgCycleTime" BO_ 416 10;
@@ -218,6 +219,7 @@ def test_resolution_range_cycle_and_frame_of_a_signal(dbc):
         ({"yaw_rate": "Inertial.YawRat"}, ("'Inertial.YawRat'", "'Inertial.YawRate'")),
         ({"yaw_rate": "Inertial.LateralAcceleration"}, ("'g'", "rad/s")),
         ({"wheel_speed": "Wheels.FrontLeft"}, ("'km/h'", "rad/s", "radius")),
+        ({"brake_pressure": "Pressures.Valid"}, ("brake_pressure=Pressures.Valid", "two numbers")),
     ],
 )
 def test_a_signal_that_does_not_fit_is_refused(dbc, channels, names):

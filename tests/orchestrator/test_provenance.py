@@ -21,6 +21,7 @@ from yawbench.orchestrator.results.freshness import key_of, staleness
 from yawbench.orchestrator.results.record_of_plan import run_record
 from yawbench.orchestrator.results.run_record import RunRecord
 from yawbench.reports.provenance import groups_of
+from yawbench.studies import jobs
 
 NOW = datetime.now(timezone.utc)
 UNITS = ("driver_sine", "reference_steady_state", "controller_fnn")
@@ -238,5 +239,10 @@ def test_results_are_up_to_date_with_another_archive_of_the_same_sources(folder,
     unfinished = BuildStamp("controller_fnn", "of the sources", "").unfinished().key
     made = recorded(by("in Python", unfinished), tmp_path)
     assert staleness(by("native"), made) is None
+    keys, timed = (
+        [jobs.key_of(by(archive), timed=name) for archive in ("in Python", "native")]
+        for name in ("", "controller")
+    )
+    assert keys[0] == keys[1] and timed[0] != timed[1]
     for other in (by("native", key="of other sources"), by("native", current=False)):
         assert mentions(staleness(other, made), "controller", "controller_fnn.fmu")

@@ -545,7 +545,6 @@ def test_what_a_series_of_lane_changes_cannot_be_driven_with_is_said_before_any_
     assert not list(tmp_path.rglob("run.json"))
 
 
-@pytest.mark.exhaustive
 def test_a_series_of_lane_changes_finds_the_highest_clean_speed_and_goes_on_where_it_was(tmp_path, capsys):
     series = tmp_path / "series"
     settings = ("--set", "step_size=0.005", "--out", series)

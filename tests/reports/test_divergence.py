@@ -8,7 +8,7 @@ import pytest
 from tests.orchestrator.recorded import car, noted, results
 from tests.refusals import each_mentions, mentions
 from yawbench.metrics.expressions import MetricValue
-from yawbench.reports.comparison import difference
+from yawbench.reports.comparison_page import difference
 from yawbench.reports.divergence import SAME, divergence, parting_summary, targets_of
 
 T = np.linspace(0.0, 1.0, 101)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import yawbench as yb
+from docs.generate.esc_times import chain_times
 from yawbench._scenario import Scenario
 from yawbench.metrics.verdict import Status
 from yawbench.orchestrator.plan import Override
@@ -61,3 +62,11 @@ def test_on_easy_sines_it_never_acts(vehicle, amplitude):
     assert run["controller.stability_state"].max() == 0.0
     assert run["controller.brake_preparation"].max() == 0.0
     assert max(run[f"wheel_control.{name}"].max() for name in wheels("brake_pressure_*")) == 0.0
+
+
+def test_the_times_of_the_chain_begin_at_its_threshold():
+    run = on_the_road("hard", **{"driver.amplitude": radians(270.0), "stop_time": 2.5}).run()
+    found = chain_times(run.results)
+    assert 0.0 < found["to_state"] <= 0.02 + 0.005  # confirmed for 20 ms, sampled every 5 ms
+    assert found["to_state"] < found["to_1_bar"] < found["to_force"] < found["to_50_bar"] < 0.4
+    assert found["rise"] == pytest.approx(24e6, rel=0.05)  # what one pump gives a front brake

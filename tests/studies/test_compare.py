@@ -18,7 +18,7 @@ from yawbench.figures.plots import LabelledRun
 from yawbench.figures.style import save
 from yawbench.foundation.errors import Diagnostic, ScenarioError
 from yawbench.metrics.expressions import MetricValue
-from yawbench.reports.comparison import BEST, comparison_view, metric_table
+from yawbench.reports.comparison_page import BEST, comparison_view, metric_table
 from yawbench.studies import result_figures
 from yawbench.studies.claim_schema import MetricSpec
 from yawbench.studies.comparison import FIGURE_SPECS, comparison, comparison_table, variants

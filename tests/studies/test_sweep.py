@@ -465,7 +465,7 @@ def page_of(folder) -> html.HtmlElement:
 
 
 def words_of(element) -> str:
-    return " ".join(" ".join(element.itertext()).split())
+    return " ".join("".join(element.xpath(".//text()[not(ancestor::script or ancestor::style)]")).split())
 
 
 def test_runs_that_were_never_made_are_not_called_failed(moods, yawbench, tmp_path):

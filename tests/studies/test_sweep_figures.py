@@ -17,7 +17,7 @@ from yawbench.studies.jobs import Job, MeasuredRun, measured
 from yawbench.studies.limits import limit_table, limits_of
 from yawbench.studies.load_experiment import load_experiment
 from yawbench.studies.result_figures import draw_over_axes
-from yawbench.studies.result_files import columns_of, write_table
+from yawbench.studies.result_files import columns_of, write_findings
 from yawbench.studies.tables import to_pandas
 
 SWEEP = """
@@ -200,7 +200,7 @@ def test_a_metric_that_no_run_gives_cannot_be_drawn(swept):
 
 def test_equal_sweeps_give_equal_tables_to_the_byte(swept, tmp_path):
     for name in ("one", "other"):
-        write_table(swept(), tmp_path / name)
+        write_findings(swept(), {}, tmp_path / name)
     assert (tmp_path / "one/table.parquet").read_bytes() == (tmp_path / "other/table.parquet").read_bytes()
     table = pq.read_table(tmp_path / "one/table.parquet")
     assert table["speed"].to_pylist()[:4] == [10.0, 10.0, 20.0, 20.0]

@@ -9,7 +9,7 @@ from pyarrow import parquet
 
 import yawbench as yb
 from tests.command_line import status_of
-from yawbench.studies.result_files import columns_of, write_table
+from yawbench.studies.result_files import columns_of, write_findings
 
 
 @pytest.fixture(scope="module")
@@ -23,7 +23,7 @@ def made():
 def folder(made, tmp_path_factory):
     """A folder as a sweep writes it: tables, and the results of every run."""
     out = tmp_path_factory.mktemp("sweep")
-    write_table(made._findings, out)
+    write_findings(made._findings, {}, out)
     for k, run in enumerate(made.runs):
         run.save(out / "runs" / str(k))
     return out

@@ -5,7 +5,9 @@ from __future__ import annotations
 import os
 import pickle
 import signal
+import sys
 import time
+import types
 
 import numpy as np
 import pytest
@@ -34,6 +36,20 @@ def test_an_error_of_the_function_is_raised_here():
         yb.within(60, careless)
     with pytest.raises((AttributeError, pickle.PicklingError), match="lambda"):
         yb.within(60, lambda: lambda: 0)
+
+
+def test_what_only_the_copy_knows_is_said_so():
+    def own(raising):
+        module = sys.modules["submitted"] = types.ModuleType("submitted")
+        exec("class Own(Exception): pass", module.__dict__)
+        if raising:
+            raise module.Own("of its own kind")
+        return module.Own()
+
+    with pytest.raises(RuntimeError, match="of its own kind"):
+        yb.within(60, own, True)
+    with pytest.raises(ModuleNotFoundError, match="submitted"):
+        yb.within(60, own, False)
 
 
 def test_code_that_never_returns_ends_at_the_deadline_with_what_it_has_started(tmp_path):

@@ -66,7 +66,7 @@ def compare(
     from dataclasses import replace
 
     from yawbench.orchestrator.results.folder_names import default_folder
-    from yawbench.reports.comparison import comparison_view
+    from yawbench.reports.comparison_page import comparison_view
     from yawbench.studies.comparison import comparison, comparison_table
 
     recordings = labelled_recordings(measured, begin)

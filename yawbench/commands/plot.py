@@ -118,10 +118,12 @@ def _window(text: str) -> tuple[float, float]:
 
     try:
         begin, end = window_of(text)
-        if begin == end:
-            raise ValueError(f"{text} is an instant: write a span, such as 1 to 3 s")
-    except ValueError as error:
-        raise ScenarioError(f"--during: {error}", code="option-invalid") from None
+    except ValueError:
+        begin = end = 0.0
+    if not begin < end:
+        raise ScenarioError(
+            f"--during: {text!r} is no time span: write one such as '1 to 3 s'", code="option-invalid"
+        )
     return begin, end
 
 

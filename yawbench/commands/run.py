@@ -179,8 +179,8 @@ def run(
 def _without_threads() -> Iterator[None]:
     """Have NumPy, if the block imports it, start no threads for products of large matrices.
 
-    A run has none, and starting them takes a twentieth of the time of a short one. What FMUs load later
-    starts its own, and whoever sets the variable has what it says.
+    A run has none, and starting them takes a twentieth of the time of a short one. FMUs in Python share this
+    NumPy, and whoever multiplies large matrices in one sets the variable, which is then left as it is.
     """
     if THREADS in os.environ:
         yield

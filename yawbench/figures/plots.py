@@ -208,11 +208,16 @@ def within(runs: Sequence[LabelledRun], window: TimeWindow) -> list[LabelledRun]
         rows = (results.time >= window[0]) & (results.time <= window[1])
         if np.count_nonzero(rows) < 2:
             raise ResultsError(
-                f"{results.where}: nothing to draw{said_during(window)}", code="nothing-to-draw"
+                f"{results.where}: nothing to draw{said_during(window)}: {_reach(results.time)}",
+                code="nothing-to-draw",
             )
         columns = {name: values[rows] for name, values in results.columns.items()}
         found.append(LabelledRun(label, replace(results, time=results.time[rows], columns=columns)))
     return found
+
+
+def _reach(times: np.ndarray) -> str:
+    return f"it was recorded from {times[0]:g} to {times[-1]:g} s" if times.size else "nothing was recorded"
 
 
 def nothing_recorded(run: LabelledRun) -> str:

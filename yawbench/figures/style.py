@@ -340,9 +340,8 @@ def _frame_bare(figure: Figure, size: tuple[float, float], handles: Sequence[Art
             borderaxespad=0.2, borderpad=0.0, columnspacing=1.0, handlelength=2.2,
         )  # fmt: skip
 
-    rows: list[
-        list[Artist]
-    ] = []  # of the legend, filled as lines of a text are: columns would make more of them
+    # of the legend, filled as lines of a text are: columns would make more of them
+    rows: list[list[Artist]] = []
     for handle in handles:
         trial = place([*(rows[-1] if rows else []), handle], 0.0)
         if rows and trial.get_window_extent().width <= 0.98 * figure.bbox.width:

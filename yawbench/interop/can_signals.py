@@ -140,6 +140,8 @@ def sensor_parameters(
             gain /= wheel_radius  # type: ignore[operator]
         if signal.whole:
             first, last = (round((x - signal.offset) / signal.scale) for x in (signal.least, signal.largest))
+            if last - first < 2:  # a range of 0 stands for none
+                raise _wrong(f"{channel}={name}", "a signal of at most two numbers is none of a sensor")
             middle = int((first + last) / 2)  # of two the one nearer to zero, which then is in reach
             parameters[f"{channel}_quantum"] = signal.scale * gain
             if offset := (signal.scale * middle + signal.offset) * gain + shift:

@@ -63,9 +63,9 @@ def choosing_table(ranked: WholeRanking, threats: ThreatResult | None) -> Table:
 
 NOTE = (
     "Passed: conditions of the matrix. Braking: share of the time in ordinary driving. Intervention: of the "
-    "wheel that gets most. Then the highest levels survived, geometric means over cars. Clear pairs: those "
-    "of controllers that the column tells apart, corrected for their number; where few of all are clear, the "
-    "order within the column may be chance."
+    "wheel that gets most. Then the hardest levels survived, geometric means over cars; of friction the "
+    "lowest is the hardest. Clear pairs: those of controllers that the column tells apart, corrected for "
+    "their number; where few of all are clear, the order within the column may be chance."
 )
 
 

@@ -99,7 +99,7 @@ def rank(
     _check("--only", "entry", only or (), ranking.entries)
     folder = options.out or default_folder(file)
     if options.dry_run:
-        from .forecast import of_ranking
+        from .dry_run import of_ranking
 
         execute = executor_of(folder, ranking.identity, options, format="parquet")
         print_forecasts(options, lambda pace: [of_ranking(ranking, execute, pace, only=only or ())])
@@ -174,7 +174,7 @@ def _rank_by_threats(
     _check("--condition", "condition", chosen, {**threats.spec.settings, **threats.spec.disciplines})
     folder = options.out or default_folder(file)
     if options.dry_run:
-        from .forecast import of_threats
+        from .dry_run import of_threats
 
         execute = executor_of(folder, threats.identity, options)
         print_forecasts(options, lambda pace: [of_threats(threats, execute, pace, only=only, chosen=chosen)])

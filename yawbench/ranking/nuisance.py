@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from yawbench.figures.display import digits_of
+from yawbench.foundation.messages import counted, in_text
 from yawbench.orchestrator.plan import Override
 from yawbench.orchestrator.scenario.schema_validation import made
 from yawbench.proving_ground.sine_with_dwell import AMPLITUDE
@@ -269,10 +270,11 @@ def nuisance_table(nuisance: Nuisance) -> Table:
     rows: list[list[Cell]] = []
     for score in nuisance.complete:
         each = [share_text(score.braking(name)) for name in nuisance.situations]
+        speeds = (score.speed_lost, score.speed_kept)
         rows.append([
             score.spec.title, share_text(score.braking()), *each,
             None if score.pressure is None else digits_of(1e-6 * score.pressure, 2),
-            *(None if x is None else f"{3.6 * x:.1f}" for x in (score.speed_lost, score.speed_kept)),
+            *(None if x is None else f"{round(3.6 * x, 1) + 0.0:.1f}" for x in speeds),  # + 0.0: no -0.0
         ])  # fmt: skip
     return Table("Nuisance in ordinary driving", headings, rows, [RULE], {*range(1, len(headings))})
 
@@ -302,8 +304,11 @@ def nuisance_sentence(nuisance: Nuisance) -> str:
     pairs = comb(len(own), 2)
     if len(own) < 2:
         return f"In ordinary driving {least.spec.title} brakes for {share_text(least.braking())} of the time."
+    alike = sum(share_text(score.braking()) == share_text(least.braking()) for score in controllers)
+    those = in_text(least.spec.title) if alike == 1 else counted(alike, "controller")
     return (
-        f"In ordinary driving, where none should act, {least.spec.title} brakes for "
-        f"{share_text(least.braking())} of the time, {most.spec.title} for {share_text(most.braking())}; of "
-        f"{pairs} pairs {among.better.sum()} are clearly different, corrected for their number."
+        f"In ordinary driving, where none should act, {those} {'brakes' if alike == 1 else 'brake'} for "
+        f"{share_text(least.braking())} of the time, {in_text(most.spec.title)} for "
+        f"{share_text(most.braking())}; of {pairs} pairs {among.better.sum()} are clearly different, "
+        f"corrected for their number; each pair taken alone, {among.alone.sum()} would be."
     )

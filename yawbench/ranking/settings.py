@@ -117,22 +117,38 @@ def settings_sentence(settings: Sequence[SettingScores]) -> str:
     totals = {one.title: _passes(one) for one in settings}
     most, least = max(totals, key=lambda t: totals[t]), min(totals, key=lambda t: totals[t])
     firsts: dict[str, int] = {}
+    alike = []
     for one in settings:
         if one.controllers:
-            best = next(iter(one.controllers.values())).spec.title
-            firsts[best] = firsts.get(best, 0) + 1
+            first, *others = one.controllers.values()
+            firsts[first.spec.title] = firsts.get(first.spec.title, 0) + 1
+            most_passed = first.count(RankedState.PASSED)
+            alike.append(1 + sum(score.count(RankedState.PASSED) == most_passed for score in others))
     leaders = [
         f"{in_text(name)} under {number}" for name, number in sorted(firsts.items(), key=lambda x: -x[1])
     ]
+    first_words = (
+        f"First in the order is {listed(leaders)}, of {_span(alike)} that pass as many conditions: among "
+        "these the peak sideslip decides. "
+        if firsts
+        else ""
+    )
     conditions = len(settings[0].ranking.conditions)
     return (
         f"Under {counted(len(settings), 'setting')} of brakes, tyres and axles, with "
         f"{counted(conditions, 'condition')} each, {len(order.kept)} of {counted(order.pairs, 'pair')} of "
-        f"controllers keep their order by the conditions passed, {order.changed} change it and {order.equal} "
-        f"never differ; {len(always)} are clearly different under all settings. First in the order is "
-        f"{listed(leaders)}. Controllers pass {100 * totals[most]:.0f} % of the conditions with the setting "
-        f"'{most}', {100 * totals[least]:.0f} % with '{least}'."
+        "controllers never reverse their order by the conditions passed (one passes more under at least one "
+        f"setting, the other under none), {order.changed} do and {order.equal} never differ; {len(always)} "
+        f"are clearly different under all settings. {first_words}"
+        f"Controllers pass {100 * totals[most]:.0f} % of the conditions with the setting '{most}', "
+        f"{100 * totals[least]:.0f} % with '{least}'."
     )
+
+
+def _span(numbers: Sequence[int]) -> str:
+    """Return the range of numbers in words."""
+    low, high = min(numbers), max(numbers)
+    return f"{low} to {high}" if low < high else str(low)
 
 
 def _passes(one: SettingScores) -> float:

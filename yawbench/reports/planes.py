@@ -1,6 +1,6 @@
-"""Phase planes that every viewer offers, with the limits within which a car is held.
+"""Phase planes that a viewer offers, with the limits within which a car is held.
 
-A page that would be too large leaves them out.
+A page that would be too large with their signals goes without them.
 
 - Sideslip rate over sideslip, with the edges of the strip of the metric `stability_index`.
 - Yaw rate over sideslip, with the yaw rate that friction holds in a steady turn at the run's first speed,

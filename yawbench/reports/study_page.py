@@ -56,7 +56,7 @@ from yawbench.studies.sections import sections
 from yawbench.studies.tables import Cell, Table
 from yawbench.studies.uncertainty import sample_tables
 
-from .comparison import ComparisonView
+from .comparison_page import ComparisonView
 from .diagram import diagram, systems_of
 from .page_parts import FigureImage, Page, ViewerPage, anchor, image_of
 from .provenance import ParameterGroup, count_kinds, fmus_of, groups_of, programs_of

@@ -75,7 +75,7 @@ class TestDriver:
             ScenarioError: it has none above 0.
         """
         initial = self._planned[0].speed
-        speed = 0.0 if initial is None else float(convert(str(initial), "m/s"))
+        speed = 0.0 if initial is None else float(convert(str(initial.value), "m/s"))
         if speed <= 0.0:
             raise ScenarioError(
                 f"{self.scenario}: has no speed above 0, from which the series could start",

@@ -388,7 +388,8 @@ def plan_experiment(
         experiment = replace(experiment, spec=experiment.spec.model_copy(update={"metrics": standard}))
     units, metric_units = _units(experiment, plans.kinds), _metric_units(experiment, made_up)
     requests = {name: metrics_of(experiment, run) if axes else () for name, run in experiment.runs.items()}
-    keys = [key_of(plans[case.number], requests[case.run.name], case.run.test) for case in cases]
+    timed = of_jobs.get("timed", "")
+    keys = [key_of(plans[case.number], requests[case.run.name], case.run.test, timed) for case in cases]
 
     def planned(number: int) -> Job:
         case, key = cases[number], keys[number]

@@ -245,14 +245,16 @@ def ready(jobs: Sequence[Job], **options: Any) -> list[Job]:
 def keyed(job: Job, metrics: MetricRequests = ()) -> Job:
     """Return a job with its metrics and key."""
     assert job.plan is not None
-    return replace(job, metrics=metrics, key=key_of(job.plan, metrics, job.test))
+    return replace(job, metrics=metrics, key=key_of(job.plan, metrics, job.test, job.timed))
 
 
-def key_of(plan: Plan, metrics: MetricRequests = (), test: TestRequest | None = None) -> str:
+def key_of(plan: Plan, metrics: MetricRequests = (), test: TestRequest | None = None, timed: str = "") -> str:
     """Return the key of a job; jobs with equal keys are the same run."""
     also: list[Any] | None = [metrics, sources_hash(OF_METRICS)] if metrics else None
     if test:
         also = [metrics, test, sources_hash(OF_TESTS)]
+    if timed:  # native code and Python of the same sources give the same numbers in other times
+        also = [also, *(unit.fmu.sha256 for unit in plan.instances if unit.name == timed)]
     return freshness.key_of(plan, also)
 
 

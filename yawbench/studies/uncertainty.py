@@ -34,7 +34,7 @@ table 2 (b) and (f). A. B. Owen, Monte Carlo variance of scrambled net quadratur
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, TypeVar
 
@@ -49,7 +49,7 @@ from .confidence import TAIL, ConfidenceInterval, interval, jackknife, share_bou
 from .experiment import Case, NamedRun
 from .experiment_result import ExperimentResult
 from .sampling import runs_of_design
-from .tables import Cell, Column, Table, column
+from .tables import Cell, Kind, Table, column
 
 PERCENTILES = (1, 5, 10, 25, 50, 75, 90, 95, 99)
 """Percentiles in files; chosen: quartiles, and the tails that are usually asked for."""
@@ -213,39 +213,37 @@ def sobol_indices(a: np.ndarray, b: np.ndarray, mixed: np.ndarray) -> SobolIndic
 # ---- tables ----
 
 
-SAMPLE_TABLES = ("statistics", "probabilities", "differences", "sensitivity")
-"""The names of a sample's tables."""
+@dataclass(frozen=True)
+class _Row:
+    """Estimates of a group: of a metric or a probability; what else is told of them, by headings."""
+
+    group: Group
+    of: str
+    about: dict[str, str | int]
+    estimates: dict[str, Estimate | None]
+
+
+SHARES = ("probability", "share smaller", "rank correlation", "first", "total")
+"""Headings of estimates that have no unit of a metric."""
 
 
 def sample_tables(
-    findings: ExperimentResult, names: Iterable[str] = SAMPLE_TABLES, keys: Iterable[str] = ()
+    findings: ExperimentResult, names: Iterable[str] = (), keys: Iterable[str] = ()
 ) -> list[Table]:
-    """Return the tables of a sample for people, one per metric and name.
+    """Return the tables of a sample for people, one per metric or probability and name.
 
     Args:
         findings: of the experiment.
-        names: of the tables. Statistics leave out metrics that are 0 or 1, which have probabilities.
+        names: of `SAMPLE_TABLES`; default: all. Statistics leave out metrics that are 0 or 1, which have
+            probabilities.
         keys: of metrics and probabilities; default: all.
     """
-    groups = groups_of(findings)
-    if not groups:
-        return []
-    metrics = [*findings.spec.metrics]
-    only = [*keys] or [*metrics, *findings.spec.probabilities]
-    differences = differences_of(findings, groups)
-    of = {
-        "statistics": [key for key in metrics if key not in findings.whether],
-        "probabilities": asked(findings),
-        "differences": metrics if differences else [],
-        "sensitivity": metrics,
-    }
-    shown: dict[str, Callable[[str], Table]] = {
-        "statistics": lambda key: _shown_statistics(findings, groups, key),
-        "probabilities": lambda key: _shown_probability(findings, groups, key),
-        "differences": lambda key: _shown_differences(findings, differences, key),
-        "sensitivity": lambda key: _shown_sensitivities(findings, groups, key),
-    }
-    tables = [shown[name](key) for name in names for key in of[name] if key in only]
+    tables, only = [], [*keys]
+    for name, rows in _rows(findings, names).items():
+        for key in dict.fromkeys(row.of for row in rows):
+            if (key in only or not only) and not (name == "statistics" and key in findings.whether):
+                shown = SAMPLE_TABLES[name][1]
+                tables.append(shown(findings, key, [row for row in rows if row.of == key]))
     return [table for table in tables if table.rows]
 
 
@@ -254,17 +252,39 @@ def sample_columns(findings: ExperimentResult, names: Iterable[str] = ()) -> dic
 
     Args:
         findings: of the experiment.
-        names: of the tables; default: all. Tables without rows are left out.
+        names: of `SAMPLE_TABLES`; default: all. Tables without rows are left out.
     """
+    return {name: _columns(findings, name, rows) for name, rows in _rows(findings, names).items() if rows}
+
+
+def _rows(findings: ExperimentResult, names: Iterable[str]) -> dict[str, list[_Row]]:
+    """Return the rows of tables of a sample; none if nothing was drawn."""
     groups = groups_of(findings)
-    if not groups:
-        return {}
-    make = {
-        "statistics": _statistics, "probabilities": _probabilities, "differences": _difference_columns,
-        "sensitivity": _sensitivities,
-    }  # fmt: skip
-    tables = {name: make[name](findings, groups) for name in names or make}
-    return {name: table for name, table in tables.items() if table.rows}
+    made = names or SAMPLE_TABLES if groups else ()
+    return {name: [*SAMPLE_TABLES[name][0](findings, groups)] for name in made}
+
+
+def _columns(findings: ExperimentResult, name: str, rows: Sequence[_Row]) -> Table:
+    """Return columns of the rows of a table: groups, metrics, numbers with bounds of intervals."""
+    names, words = _names(findings), [row.group.words for row in rows]
+    groups = [column(name, "string", [row[k] for row in words]) for k, name in enumerate(names)]
+    of = [row.of for row in rows]
+    if name == "probabilities":
+        first = [column("probability of", "string", of), *groups]
+    else:
+        about = {"description": "of the numbers beside it, where they are no shares"}
+        units = column("unit", "string", [si(findings.unit(key)) for key in of], about)
+        first = [*groups, column("metric", "string", of), units]
+    for heading, told in rows[0].about.items():
+        kind: Kind = "int64" if isinstance(told, int) else "string"
+        first.append(column(heading, kind, [row.about[heading] for row in rows]))
+    for heading in rows[0].estimates:
+        estimates = [row.estimates[heading] for row in rows]
+        for k, end in enumerate(("", " low", " high")):
+            numbers = [None if one is None else one[k] for one in estimates]
+            unit = {"unit": "1"} if heading in SHARES else None
+            first.append(column(f"{heading}{end}", "float64", numbers, unit))
+    return Table.of_columns(first)
 
 
 def _names(findings: ExperimentResult) -> list[str]:
@@ -280,98 +300,52 @@ def _heading(findings: ExperimentResult, key: str) -> str:
 
 def _cell(findings: ExperimentResult, key: str, estimate: Estimate | None) -> Cell:
     """Return an estimate of a metric with its interval."""
-    return None if estimate is None else _with_bounds(estimate, findings.unit(key))
+    return _with_bounds(estimate, findings.unit(key))
 
 
-def _with_bounds(estimate: Estimate, unit: str) -> MetricValue:
+def _with_bounds(estimate: Estimate | None, unit: str) -> MetricValue | None:
+    if estimate is None:
+        return None
     number, low, high = estimate
     if low is None or high is None:
         return MetricValue(number, unit)
     return MetricValue(number, unit, max(high - number, number - low), (low, high))
 
 
-def _shown_statistics(findings: ExperimentResult, groups: Sequence[Group], key: str) -> Table:
+def _finite(findings: ExperimentResult, group: Group, key: str) -> tuple[np.ndarray, int]:
+    """Return the numbers of a metric that runs of a group have, and how many have none."""
+    every = independent(findings, numbers_of(findings, group, key))
+    numbers: np.ndarray = every[np.isfinite(every)]
+    return numbers, len(every) - len(numbers)
+
+
+def _percentiles(numbers: np.ndarray, wanted: Sequence[int]) -> dict[str, Estimate | None]:
+    return {f"p{p}": percentile(numbers, p) if len(numbers) else None for p in wanted}
+
+
+def _statistics(findings: ExperimentResult, groups: Sequence[Group]) -> Iterator[_Row]:
+    for group in groups:
+        for key in findings.spec.metrics:
+            numbers, missing = _finite(findings, group, key)
+            share = key in findings.whether and len(numbers)
+            average = probability(int(numbers.sum()), len(numbers)) if share else mean(numbers)
+            moments = {"mean": average, "deviation": deviation(numbers)}
+            counts: dict[str, str | int] = {"runs": len(numbers), "missing": missing}
+            yield _Row(group, key, counts, moments | _percentiles(numbers, PERCENTILES))
+
+
+def _shown_statistics(findings: ExperimentResult, key: str, rows: Sequence[_Row]) -> Table:
     headings = ["runs", "mean", "standard deviation", *(f"{p} %" for p in SHOWN)]
     table = Table(f"{_heading(findings, key)}, over what is drawn", [*_names(findings), *headings])
-    for group in groups:
-        every = independent(findings, numbers_of(findings, group, key))
-        numbers = every[np.isfinite(every)]
-        if not len(numbers):
-            continue
-        estimates = [mean(numbers), deviation(numbers), *(percentile(numbers, p) for p in SHOWN)]
-        count = f"{len(numbers)}" if len(numbers) == len(every) else f"{len(numbers)} of {len(every)}"
-        cells = [_cell(findings, key, estimate) for estimate in estimates]
-        table.rows.append([*group.words, count, *cells])
-        if len(numbers) < len(every):
-            table.notes = ["runs without a number are not in these numbers"]
+    for row in rows:
+        runs, missing = int(row.about["runs"]), int(row.about["missing"])
+        if runs:
+            shown = (row.estimates[heading] for heading in ("mean", "deviation", *(f"p{p}" for p in SHOWN)))
+            count = f"{runs} of {runs + missing}" if missing else f"{runs}"
+            table.rows.append([*row.group.words, count, *(_cell(findings, key, one) for one in shown)])
+            if missing:
+                table.notes = ["runs without a number are not in these numbers"]
     return table
-
-
-def _columns(
-    findings: ExperimentResult,
-    rows: Sequence[tuple[Group, str]],
-    more: Iterable[tuple[Column, Sequence[Cell]]],
-) -> Table:
-    """Return columns that begin with the group and the metric of each row."""
-    names = _names(findings)
-    words = [[*group.words] for group, _ in rows]
-    first = [column(name, "string", [row[k] for row in words]) for k, name in enumerate(names)]
-    units = [si(findings.unit(key)) if key in findings.spec.metrics else "1" for _, key in rows]
-    about = [
-        column("metric", "string", [key for _, key in rows]),
-        column(
-            "unit", "string", units, {"description": "of the numbers beside it, where they are no shares"}
-        ),
-    ]
-    return Table.of_columns([*first, *about, *more])
-
-
-def _estimated(
-    heading: str, estimates: Sequence[Estimate | None], about: dict[str, str] | None = None
-) -> list[tuple[Column, Sequence[Cell]]]:
-    """Return the columns of estimates and of the bounds of their intervals."""
-    parts = [("", 0), (" low", 1), (" high", 2)]
-    return [
-        column(f"{heading}{part}", "float64", [one[k] if one else None for one in estimates], about)
-        for part, k in parts
-    ]
-
-
-def _statistics(findings: ExperimentResult, groups: Sequence[Group]) -> Table:
-    rows = [(group, key) for group in groups for key in findings.spec.metrics]
-    every = [independent(findings, numbers_of(findings, group, key)) for group, key in rows]
-    numbers = [some[np.isfinite(some)] for some in every]
-    counts = [
-        column("runs", "int64", [len(some) for some in numbers]),
-        column(
-            "missing", "int64", [len(all_) - len(some) for all_, some in zip(every, numbers, strict=True)]
-        ),
-    ]
-    means = [
-        probability(int(some.sum()), len(some)) if key in findings.whether and len(some) else mean(some)
-        for (_, key), some in zip(rows, numbers, strict=True)
-    ]
-    percentiles = [
-        part
-        for p in PERCENTILES
-        for part in _estimated(f"p{p}", [percentile(some, p) if len(some) else None for some in numbers])
-    ]
-    return _columns(
-        findings,
-        rows,
-        [
-            *counts,
-            *_estimated("mean", means),
-            *_estimated("deviation", [deviation(some) for some in numbers]),
-            *percentiles,
-        ],
-    )
-
-
-def asked(findings: ExperimentResult) -> list[str]:
-    """Return the names of what a sample tells the probability of: conditions, and metrics that are 0 or 1."""
-    spec = findings.spec
-    return [*dict.fromkeys((*spec.probabilities, *(key for key in spec.metrics if key in findings.whether)))]
 
 
 def holding(findings: ExperimentResult, group: Group, name: str) -> tuple[int, int, int]:
@@ -382,9 +356,8 @@ def holding(findings: ExperimentResult, group: Group, name: str) -> tuple[int, i
     """
     assertion = findings.spec.probabilities.get(name)
     if assertion is None:
-        numbers = independent(findings, numbers_of(findings, group, name))
-        known = numbers[np.isfinite(numbers)]
-        return int(known.sum()), len(numbers) - len(known), len(known)
+        numbers, missing = _finite(findings, group, name)
+        return int(numbers.sum()), missing, len(numbers)
     cases = independent(findings, group.cases)
     labels = {group.run.name: group.run.row}
     verdicts = [
@@ -394,45 +367,29 @@ def holding(findings: ExperimentResult, group: Group, name: str) -> tuple[int, i
     return sum(one.holds is True for one in verdicts), sum(one.holds is None for one in verdicts), len(cases)
 
 
-def _probability_rows(
-    findings: ExperimentResult, groups: Sequence[Group], names: Iterable[str]
-) -> list[tuple[Group, str, int, int, int, Estimate]]:
-    """Return group, name, how many runs meet it, have no number, and there are, and the probability."""
-    rows = []
-    for name in names:
+def _probabilities(findings: ExperimentResult, groups: Sequence[Group]) -> Iterator[_Row]:
+    """Yield rows of conditions, and of metrics that are 0 or 1."""
+    spec = findings.spec
+    happening = (key for key in spec.metrics if key in findings.whether)
+    for name in dict.fromkeys((*spec.probabilities, *happening)):
         for group in groups:
             count, missing, number = holding(findings, group, name)
             if number:
-                rows.append((group, name, count, missing, number, probability(count, number)))
-    return rows
+                counts: dict[str, str | int] = {"runs": number, "meeting": count, "missing": missing}
+                yield _Row(group, name, counts, {"probability": probability(count, number)})
 
 
-def _shown_probability(findings: ExperimentResult, groups: Sequence[Group], name: str) -> Table:
+def _shown_probability(findings: ExperimentResult, name: str, rows: Sequence[_Row]) -> Table:
     assertion = findings.spec.probabilities.get(name)
     says = assertion.says.rstrip(".") if assertion else _heading(findings, name)
     table = Table(f"Probability: {says}", [*_names(findings), "runs", "probability"])
-    for group, _, count, missing, number, estimate in _probability_rows(findings, groups, [name]):
-        table.rows.append([*group.words, f"{count} of {number}", _with_bounds(estimate, "%")])
-        if missing:
+    for row in rows:
+        count = f"{row.about['meeting']} of {row.about['runs']}"
+        table.rows.append([*row.group.words, count, _with_bounds(row.estimates["probability"], "%")])
+        if row.about["missing"]:
             without = "counts as one that does not meet the conditions" if assertion else "does not count"
             table.notes = [f"a run without a number {without}"]
     return table
-
-
-def _probabilities(findings: ExperimentResult, groups: Sequence[Group]) -> Table:
-    rows = _probability_rows(findings, groups, asked(findings))
-    names = _names(findings)
-    words = [group.words for group, *_ in rows]
-    return Table.of_columns(
-        [
-            column("probability of", "string", [name for _, name, *_ in rows]),
-            *(column(name, "string", [row[k] for row in words]) for k, name in enumerate(names)),
-            column("runs", "int64", [number for *_, number, _ in rows]),
-            column("meeting", "int64", [count for *_, count, _, _, _ in rows]),
-            column("missing", "int64", [missing for *_, missing, _, _ in rows]),
-            *_estimated("probability", [estimate for *_, estimate in rows], {"unit": "1"}),
-        ]
-    )
 
 
 class Difference(NamedTuple):
@@ -472,41 +429,28 @@ def subtracted(findings: ExperimentResult, one: Group, other: Group, key: str) -
     return kept
 
 
-def _shown_differences(findings: ExperimentResult, differences: Sequence[Difference], key: str) -> Table:
+def _differences(findings: ExperimentResult, groups: Sequence[Group]) -> Iterator[_Row]:
+    for of in differences_of(findings, groups):
+        for key in findings.spec.metrics:
+            numbers = subtracted(findings, of.group, of.baseline, key)
+            smaller = probability(int(np.sum(numbers < 0)), len(numbers)) if len(numbers) else None
+            yield _Row(
+                of.group, key, {"axis": of.axis, "less that of": of.than, "runs": len(numbers)},
+                {"mean": mean(numbers), "deviation": deviation(numbers)}
+                | _percentiles(numbers, SHOWN) | {"share smaller": smaller},
+            )  # fmt: skip
+
+
+def _shown_differences(findings: ExperimentResult, key: str, rows: Sequence[_Row]) -> Table:
     title = f"{_heading(findings, key)}, differences at the same points"
     table = Table(title, [*_names(findings), "less that of", "runs", "mean", "5 %", "95 %", "smaller in"])
-    for of in differences:
-        numbers = subtracted(findings, of.group, of.baseline, key)
-        if len(numbers):
-            ends = [_cell(findings, key, percentile(numbers, p)) for p in (5, 95)]
-            smaller = _with_bounds(probability(int(np.sum(numbers < 0)), len(numbers)), "%")
-            cells = [f"{len(numbers)}", _cell(findings, key, mean(numbers)), *ends, smaller]
-            table.rows.append([*of.group.words, of.than, *cells])
+    for row in rows:
+        if row.about["runs"]:
+            shown = (_cell(findings, key, row.estimates[heading]) for heading in ("mean", "p5", "p95"))
+            of = [str(row.about["less that of"]), str(row.about["runs"])]
+            smaller = _with_bounds(row.estimates["share smaller"], "%")
+            table.rows.append([*row.group.words, *of, *shown, smaller])
     return table
-
-
-def _difference_columns(findings: ExperimentResult, groups: Sequence[Group]) -> Table:
-    rows = [(of, key) for of in differences_of(findings, groups) for key in findings.spec.metrics]
-    numbers = [subtracted(findings, of.group, of.baseline, key) for of, key in rows]
-    smaller = [probability(int(np.sum(of < 0)), len(of)) if len(of) else None for of in numbers]
-    percentiles = [
-        part
-        for p in SHOWN
-        for part in _estimated(f"p{p}", [percentile(of, p) if len(of) else None for of in numbers])
-    ]
-    return _columns(
-        findings,
-        [(of.group, key) for of, key in rows],
-        [
-            column("axis", "string", [of.axis for of, _ in rows]),
-            column("less that of", "string", [of.than for of, _ in rows]),
-            column("runs", "int64", [len(of) for of in numbers]),
-            *_estimated("mean", [mean(of) for of in numbers]),
-            *_estimated("deviation", [deviation(of) for of in numbers]),
-            *percentiles,
-            *_estimated("share smaller", smaller, {"unit": "1"}),
-        ],
-    )
 
 
 def sensitivities(
@@ -528,33 +472,36 @@ def sensitivities(
     return found
 
 
-def _shown_sensitivities(findings: ExperimentResult, groups: Sequence[Group], key: str) -> Table:
+def _sensitivities(findings: ExperimentResult, groups: Sequence[Group]) -> Iterator[_Row]:
+    whole = findings.spec.design == "saltelli"
+    for group in groups:
+        for key in findings.spec.metrics:
+            for name, (rank, found) in sensitivities(findings, group, key).items():
+                indices = {"first": found and found.first, "total": found and found.total} if whole else {}
+                yield _Row(group, key, {"axis": name}, {"rank correlation": rank, **indices})
+
+
+def _shown_sensitivities(findings: ExperimentResult, key: str, rows: Sequence[_Row]) -> Table:
     whole = findings.spec.design == "saltelli"
     headings = ["rank correlation", *(["Sobol index, alone", "with others"] if whole else [])]
     table = Table(f"{_heading(findings, key)}, what it depends on", [*_names(findings), "drawn", *headings])
-    for group in groups:
-        for name, (rank, indices) in sensitivities(findings, group, key).items():
-            estimates = [rank, *((indices or (None, None)) if whole else ())]
-            cells: list[Cell] = [None if one is None else _with_bounds(one, "1") for one in estimates]
-            if any(cell is not None for cell in cells):
-                table.rows.append([*group.words, findings.spec.axes[name].says or name, *cells])
+    for row in rows:
+        name, cells = str(row.about["axis"]), [_with_bounds(one, "1") for one in row.estimates.values()]
+        if any(cell is not None for cell in cells):
+            table.rows.append([*row.group.words, findings.spec.axes[name].says or name, *cells])
     return table
 
 
-def _sensitivities(findings: ExperimentResult, groups: Sequence[Group]) -> Table:
-    rows = [
-        (group, key, name, *pair)
-        for group in groups
-        for key in findings.spec.metrics
-        for name, pair in sensitivities(findings, group, key).items()
-    ]
-    about = {"unit": "1"}
-    more = [
-        column("axis", "string", [name for _, _, name, *_ in rows]),
-        *_estimated("rank correlation", [rank for *_, rank, _ in rows], about),
-    ]
-    if findings.spec.design == "saltelli":
-        indices: list[SobolIndices | None] = [row[-1] for row in rows]
-        more += _estimated("first", [one and one.first for one in indices], about)
-        more += _estimated("total", [one and one.total for one in indices], about)
-    return _columns(findings, [(group, key) for group, key, *_ in rows], more)
+SAMPLE_TABLES: dict[
+    str,
+    tuple[
+        Callable[[ExperimentResult, Sequence[Group]], Iterator[_Row]],
+        Callable[[ExperimentResult, str, Sequence[_Row]], Table],
+    ],
+] = {
+    "statistics": (_statistics, _shown_statistics),
+    "probabilities": (_probabilities, _shown_probability),
+    "differences": (_differences, _shown_differences),
+    "sensitivity": (_sensitivities, _shown_sensitivities),
+}
+"""Name of a table -> what makes its rows, and the table for people of those of a metric or a probability."""
