@@ -9,6 +9,7 @@ from __future__ import annotations
 import gc
 import os
 import shlex
+import signal
 import subprocess
 from collections.abc import Callable, Iterator
 from functools import cache
@@ -42,6 +43,9 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 much again."""
 
 os.environ.pop("COLUMNS", None)  # pytest-xdist says 80, whatever the terminal
+
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as a shell has it for what runs in the background
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 gc.set_threshold(50_000, 20, 20)
 """Python looks for garbage less often: thousands of tests keep much, and leave little."""
