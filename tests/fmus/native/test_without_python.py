@@ -25,7 +25,7 @@ from tests.refusals import mentions
 from yawbench.fmus.archive import runs_as
 from yawbench.fmus.build import HERE as FMUS
 from yawbench.fmus.build import find_components, has_native_library
-from yawbench.fmus.compiler import TO_WINDOWS
+from yawbench.fmus.compiler import PLATFORMS, TO_WINDOWS, compiler_for
 
 OLDEST_GLIBC = (2, 14)
 """As docs/other_tools.md says."""
@@ -34,6 +34,7 @@ SHARES = pytest.mark.parametrize(
     "share", [slice(0, None, 8), pytest.param(slice(None), marks=pytest.mark.exhaustive)]
 )
 """Every eighth unit in the first tier, all in the second."""
+TO_ARM, ARM_LIBC = PLATFORMS["aarch64-linux"], Path("/usr/aarch64-linux-gnu")
 
 
 @pytest.fixture(scope="module")
@@ -131,3 +132,26 @@ def test_on_windows_native_units_agree_with_linux_to_a_trillionth(native, tmp_pa
     for (fmu, inputs), found in zip(units, in_wine(units, tmp_path, wine_prefix), strict=True):
         for row, expected in zip(found, ten_steps(fmu, inputs), strict=True):
             assert row == pytest.approx(expected, rel=1e-12, abs=1e-12), fmu.name
+
+
+@pytest.mark.skipif(
+    shutil.which("qemu-aarch64") is None or not ARM_LIBC.is_dir() or compiler_for(TO_ARM) is None,
+    reason="needs qemu-user, a libc for ARM and a cross compiler",
+)
+def test_on_arm_native_units_give_the_bits_of_this_computer(native, tmp_path):
+    command, _ = compiler_for(TO_ARM)
+    host = tmp_path / "host"
+    source = Path(__file__).parents[1] / "host.c"
+    subprocess.run([*command, "-std=c11", "-O1", f"-I{FMUS}", source, "-o", host, "-ldl"], check=True)
+    on_arm = [folder for folder in native if has_native_library(FMUS / f"{Fmu(folder).name}.fmu", TO_ARM)]
+    if not on_arm:
+        pytest.skip("no FMU is built for ARM: yawbench build --platform aarch64-linux")
+    for folder in on_arm:
+        (library,) = (folder / "binaries" / TO_ARM.name).glob("*.so")
+        program, _, *arguments = host_command(host, folder)
+        done = subprocess.run(
+            ["qemu-aarch64", "-L", ARM_LIBC, program, library, *arguments],
+            capture_output=True, text=True, check=False,
+        )  # fmt: skip
+        assert (done.returncode, done.stderr) == (0, ""), folder
+        assert host_outputs(done, folder) == expected_outputs(folder), folder
