@@ -205,9 +205,9 @@ class Results:
         if role is not None:
             instances = self.instances_of_role(role)
             columns = [column for column in columns if self.names[column].instance in instances]
-        return columns if columns or role is not None else self._feeding(variable)
+        return columns if columns or role is not None else self.feeding(variable)
 
-    def _feeding(self, variable: str) -> list[str]:
+    def feeding(self, variable: str) -> list[str]:
         """Return the columns that feed inputs of this name unchanged, apart from a conversion of units."""
         feeding = [
             str(wire.source)

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import warnings
+import zipfile
 
 import pytest
 
 import yawbench as yb
+from tests.checkout import ROOT
 
 SWD = "proving_ground/sine_with_dwell"
 LATE_RELEASE = {
@@ -88,6 +90,25 @@ def test_the_first_sentence_names_the_cause(made, named):
     first, *_ = run.why()
     assert all(word in first for word in named), run.why()
     assert len(run.why()) <= 3
+
+
+def test_a_moment_that_its_controller_calls_otherwise_is_seen(fmus, tmp_path):
+    with (
+        zipfile.ZipFile(fmus / "controller_pid.fmu") as ours,
+        zipfile.ZipFile(tmp_path / "own.fmu", "w") as own,
+    ):
+        for name in ours.namelist():
+            own.writestr(name, ours.read(name).replace(b'name="yaw_moment"', b'name="mz"'))
+    text = (ROOT / f"scenarios/{SWD}.yaml").read_text().replace("../vehicles", f"{ROOT}/scenarios/vehicles")
+    text = text.replace("fmu: controller_off", f"fmu: {tmp_path / 'own.fmu'}")
+    (tmp_path / "own.yaml").write_text(text + "  - {from: controller.mz, to: allocator.yaw_moment}\n")
+    lost = (
+        yb.load(tmp_path / "own.yaml")
+        .set({"vehicle": "scenarios/vehicles/hard.yaml", "controller.moment_limit": 700})
+        .run()
+    )
+    first, *_ = lost.why()
+    assert all(word in first for word in ("moment", "limit", "700 N.m")), lost.why()
 
 
 def test_a_car_that_is_held_has_no_reason_to_be_lost():

@@ -132,8 +132,8 @@ RATIO = 16.0
 
 
 def sources_of_moment(results: Results) -> list[str]:
-    """Return the columns of the yaw moments that controllers ask for."""
-    return results.candidates("yaw_moment", role="controller")
+    """Return the columns of the yaw moments that controllers ask for, whatever these call them."""
+    return results.candidates("yaw_moment", role="controller") or results.feeding("yaw_moment")
 
 
 LEAST_MOMENT = 0.05
