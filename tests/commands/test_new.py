@@ -88,7 +88,7 @@ def test_an_exercise_is_failed_as_it_begins_and_passed_with_a_law(project):
     folder, _ = project
     status, out, said = called(folder, "yawbench", "new", "exercise", "hold")
     assert status == 0, said
-    _, build, test, study, mark = [shlex.split(line) for line in out.splitlines()]
+    units, build, test, study, mark = [shlex.split(line) for line in out.splitlines()]
     law = folder / "controllers" / "hold.py"
     begun = law.read_text()
     results = []
@@ -116,7 +116,8 @@ def test_an_exercise_is_failed_as_it_begins_and_passed_with_a_law(project):
     assert each_mentions(out, ("endless.py", "0 of 2", "20 s"), ("leaving.py", "0 of 2"), ("no law yet",))
     rows = [line.split(",")[:3] for line in marking.with_name("marks.csv").read_text().splitlines()[1:]]
     assert rows == [[str(one), "0", "fail"] for one in (endless, leaving, submission)]
-    assert "hold" in (folder / "exercises/hold/README.md").read_text()
+    task = (folder / "exercises/hold/README.md").read_text()
+    assert all(shlex.join(["yawbench", *command[1:]]) in task for command in (units, build))
 
 
 @pytest.fixture(scope="module")

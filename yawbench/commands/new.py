@@ -9,7 +9,7 @@ import re
 import shlex
 import shutil
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Annotated, Any, Literal
@@ -144,9 +144,35 @@ def _exercise(name: str, in_checkout: bool, scenario: PurePosixPath, facts: dict
         unit.test: "exercise_test.py.j2",
         study: "exercise_study.yaml.j2",
         home / "mark.py": "exercise_mark.py.j2",
-        home / "README.md": "exercise.md.j2",
     }
-    return NewFiles(unit.files | _rendered(own, facts), study, unit.source, unit.test)
+    files = unit.files | _rendered(own, facts)
+    builds = _builds(files, "controller", unit.source, in_checkout)
+    facts["builds"] = [shlex.join(("yawbench", "build", *map(str, arguments))) for arguments in builds]
+    files |= _rendered({home / "README.md": "exercise.md.j2"}, facts)
+    return NewFiles(files, study, unit.source, unit.test)
+
+
+def _other(role: str, source: PurePosixPath | None) -> str:
+    """Return the FMU that a new unit is compared with; "" for files without a unit."""
+    return "controller_off" if role == "controller" else (UNITS | MORE)[role][0] if source else ""
+
+
+def _builds(
+    files: Mapping[PurePosixPath, str], role: str, source: PurePosixPath | None, in_checkout: bool
+) -> list[list[str | PurePosixPath]]:
+    """Return the arguments of each `yawbench build` of what new files need, with paths from their folder.
+
+    Outside a checkout only the FMUs that they use are built, which takes seconds instead of minutes.
+    """
+    from yawbench.fmus.build import find_recipes
+
+    if in_checkout:
+        return [[]]
+    written = " ".join(files.values())
+    used = {name for name in find_recipes() if re.search(rf"\b{name}\b", written)}
+    other = _other(role, source)
+    out: list[str | PurePosixPath] = ["--out", PurePosixPath("fmus")]
+    return [[*sorted({*used, *filter(None, [other])}), *out], *([[source, *out]] if source else [])]
 
 
 def _unit(
@@ -345,22 +371,17 @@ def _texts(data: Any) -> Iterable[str]:
 
 
 def _next(kind: str, name: str, begun: NewFiles, folder: Path, in_checkout: bool) -> list[list[str]]:
-    """Return the commands that build, test and run the new files.
-
-    Outside a checkout only the FMUs that they use are built, which takes seconds instead of minutes.
-    """
-    from yawbench.fmus.build import find_recipes
-
+    """Return the commands that build, test and run the new files."""
     yawbench, python = _program("yawbench"), _program("python")
-    fmus = [] if in_checkout else ["--out", str(_shown(folder / "fmus"))]
-    written = " ".join(begun.files.values())
-    used = [name for name in find_recipes() if re.search(rf"\b{name}\b", written)]
     role = "controller" if kind == "exercise" else kind
-    other = "controller_off" if role == "controller" else (UNITS | MORE)[role][0] if begun.source else ""
-    needed = [] if in_checkout else sorted({*used, *filter(None, [other])})
-    commands = [[yawbench, "build", *needed, *fmus]]
-    if begun.source and not in_checkout:
-        commands.append([yawbench, "build", str(_shown(folder / begun.source)), *fmus])
+    commands = [
+        [
+            yawbench,
+            "build",
+            *(one if isinstance(one, str) else str(_shown(folder / one)) for one in arguments),
+        ]
+        for arguments in _builds(begun.files, role, begun.source, in_checkout)
+    ]
     if begun.test:
         if importlib.util.find_spec("pytest") is None:
             commands.append([python, "-m", "pip", "install", "pytest"])
@@ -371,7 +392,9 @@ def _next(kind: str, name: str, begun: NewFiles, folder: Path, in_checkout: bool
     if kind == "exercise":
         commands.append([python, str(_shown(folder / "exercises" / name / "mark.py"))])
     elif begun.source:
-        commands.append([yawbench, "compare", main, "--swap", f"{kind}={other},{kind}_{name}"])
+        commands.append(
+            [yawbench, "compare", main, "--swap", f"{kind}={_other(role, begun.source)},{kind}_{name}"]
+        )
     return commands
 
 
