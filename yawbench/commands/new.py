@@ -11,7 +11,7 @@ import shutil
 import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from pathlib import Path, PurePosixPath
+from pathlib import Path, PurePath, PurePosixPath
 from typing import Annotated, Any, Literal
 
 import typer
@@ -146,8 +146,8 @@ def _exercise(name: str, in_checkout: bool, scenario: PurePosixPath, facts: dict
         home / "mark.py": "exercise_mark.py.j2",
     }
     files = unit.files | _rendered(own, facts)
-    builds = _builds(files, "controller", unit.source, in_checkout)
-    facts["builds"] = [shlex.join(("yawbench", "build", *map(str, arguments))) for arguments in builds]
+    builds = _builds(files, "controller", unit.source, in_checkout, PurePosixPath())
+    facts["builds"] = [shlex.join(("yawbench", "build", *arguments)) for arguments in builds]
     files |= _rendered({home / "README.md": "exercise.md.j2"}, facts)
     return NewFiles(files, study, unit.source, unit.test)
 
@@ -158,9 +158,13 @@ def _other(role: str, source: PurePosixPath | None) -> str:
 
 
 def _builds(
-    files: Mapping[PurePosixPath, str], role: str, source: PurePosixPath | None, in_checkout: bool
-) -> list[list[str | PurePosixPath]]:
-    """Return the arguments of each `yawbench build` of what new files need, with paths from their folder.
+    files: Mapping[PurePosixPath, str],
+    role: str,
+    source: PurePosixPath | None,
+    in_checkout: bool,
+    folder: PurePath,
+) -> list[list[str]]:
+    """Return the arguments of each `yawbench build` of what new files in a folder need.
 
     Outside a checkout only the FMUs that they use are built, which takes seconds instead of minutes.
     """
@@ -170,9 +174,9 @@ def _builds(
         return [[]]
     written = " ".join(files.values())
     used = {name for name in find_recipes() if re.search(rf"\b{name}\b", written)}
-    other = _other(role, source)
-    out: list[str | PurePosixPath] = ["--out", PurePosixPath("fmus")]
-    return [[*sorted({*used, *filter(None, [other])}), *out], *([[source, *out]] if source else [])]
+    out = ["--out", str(folder / "fmus")]
+    own = [[str(folder / source), *out]] if source else []
+    return [[*sorted({*used, *filter(None, [_other(role, source)])}), *out], *own]
 
 
 def _unit(
@@ -374,14 +378,8 @@ def _next(kind: str, name: str, begun: NewFiles, folder: Path, in_checkout: bool
     """Return the commands that build, test and run the new files."""
     yawbench, python = _program("yawbench"), _program("python")
     role = "controller" if kind == "exercise" else kind
-    commands = [
-        [
-            yawbench,
-            "build",
-            *(one if isinstance(one, str) else str(_shown(folder / one)) for one in arguments),
-        ]
-        for arguments in _builds(begun.files, role, begun.source, in_checkout)
-    ]
+    builds = _builds(begun.files, role, begun.source, in_checkout, _shown(folder))
+    commands = [[yawbench, "build", *arguments] for arguments in builds]
     if begun.test:
         if importlib.util.find_spec("pytest") is None:
             commands.append([python, "-m", "pip", "install", "pytest"])
