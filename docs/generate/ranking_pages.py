@@ -38,7 +38,7 @@ from yawbench.ranking.threat_scores import (
 from yawbench.ranking.threat_tables import titles_of
 from yawbench.ranking.threats import REFERENCE, SearchPlace, load_threats
 from yawbench.ranking.whole import WholeRanking
-from yawbench.studies.confidence import CONFIDENCE, sign_test
+from yawbench.studies.confidence import CONFIDENCE, ToldApart, sign_test
 from yawbench.studies.tables import Table
 
 from . import matrix_tables, threat_tables
@@ -68,15 +68,20 @@ class Matrix:
         """How many entries share the first place."""
         return sum(score.place == 1 for score in self.result.scores)
 
+    @cached_property
+    def apart(self) -> ToldApart:
+        """Which of the laws are told apart by the conditions passed."""
+        return apart_by_conditions(self.laws)
+
     @property
     def clear(self) -> int:
         """How many pairs of laws are clearly different by the conditions passed."""
-        return int(apart_by_conditions(self.laws).better.sum())
+        return int(self.apart.better.sum())
 
     @property
     def alone(self) -> dict[str, int]:
         """Title of a law -> of how many pairs with it one is better, each pair taken alone; those of most."""
-        alone = apart_by_conditions(self.laws).alone
+        alone = self.apart.alone
         found = {
             in_text(score.spec.title): int(alone[k].sum() + alone[:, k].sum())
             for k, score in enumerate(self.laws)
@@ -121,7 +126,7 @@ class Matrix:
     @property
     def pairs_alone(self) -> int:
         """Of how many pairs of laws one is better by the conditions passed, each pair taken alone."""
-        return int(apart_by_conditions(self.laws).alone.sum())
+        return int(self.apart.alone.sum())
 
     @property
     def needed(self) -> int:
@@ -132,12 +137,12 @@ class Matrix:
     @property
     def most_passed(self) -> int:
         """How many conditions the first of the order passes."""
-        return self.laws[0].count(RankedState.PASSED)
+        return self.passed(self.laws[0])
 
     @property
     def fewest(self) -> EntryScore:
         """The law that passes the fewest conditions."""
-        return min(self.laws, key=lambda score: score.count(RankedState.PASSED))
+        return min(self.laws, key=self.passed)
 
     def title(self, score: EntryScore) -> str:
         """Return an entry's title inside a sentence."""
