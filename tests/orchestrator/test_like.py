@@ -8,7 +8,7 @@ import pytest
 
 from tests.refusals import mentions, refused, texts_of
 from yawbench.foundation.errors import ScenarioError
-from yawbench.orchestrator.scenario import catalogue, like, yaml_lines
+from yawbench.orchestrator.scenario import catalogue, like
 from yawbench.orchestrator.scenario.loader import load_scenario
 from yawbench.planner import Planner
 from yawbench.studies.load_experiment import load_experiment
@@ -38,21 +38,14 @@ def read(name: str, what: str = "scenario file"):
 
 
 def test_a_scenario_takes_everything_of_another_and_changes_some():
-    path = written(
-        "mine.yaml",
-        f"like: {PAPER_A}\nfriction: 0.3\nunits: {{driver: {{parameters: {{frequency: 0.5}}}}}}\n",
-    )
-    mine, other = load_scenario(path), load_scenario(PAPER_A)
+    own = "friction: 0.3\nunits: {driver: {parameters: {frequency: 0.5}}}\n"
+    mine, other = load_scenario(written("mine.yaml", f"like: {PAPER_A}\n{own}")), load_scenario(PAPER_A)
     assert mine.friction.value == 0.3
-    assert {n: g.value for n, g in mine.units["driver"].parameters.items()} == {
-        "amplitude": 0.0325, "frequency": 0.5, "start_time": 1.0,
-    }  # fmt: skip
+    given = {name: given.value for name, given in mine.units["driver"].parameters.items()}
+    assert given == {"amplitude": 0.0325, "frequency": 0.5, "start_time": 1.0}
     assert mine.vehicle_file.values == other.vehicle_file.values
-    assert (mine.title, list(mine.units), mine.connections) == (
-        other.title,
-        list(other.units),
-        other.connections,
-    )
+    assert (mine.title, list(mine.units)) == (other.title, list(other.units))
+    assert mine.connections == other.connections
     assert "like" not in mine.as_run()
 
 
@@ -96,11 +89,8 @@ def test_paths_stay_relative_to_the_file_in_which_they_stand(tmp_path):
 def test_a_study_is_like_another_one():
     path = written("mine.yaml", f"like: {SCENARIOS / 'fnn_sideslip/sweep.yaml'}\ntitle: Mine\n")
     mine, other = load_experiment(path), load_experiment(SCENARIOS / "fnn_sideslip/sweep.yaml")
-    assert mine.spec.title == "Mine"
-    assert mine.spec.axes == other.spec.axes
-    assert [run.scenario.resolve() for run in mine.runs.values()] == [
-        run.scenario.resolve() for run in other.runs.values()
-    ]
+    (own,), (its,) = ([run.scenario.resolve() for run in one.runs.values()] for one in (mine, other))
+    assert (mine.spec.title, mine.spec.axes, own) == ("Mine", other.spec.axes, its)
     assert catalogue.kind_of(path) == "a sweep file"
 
 
@@ -147,17 +137,8 @@ def test_a_changed_mass_keeps_the_wheels_as_an_override_does(fmus):
     assert plan(fmus, "like: large_saloon\n")[1] == 1830.0
 
 
-def test_values_for_a_unit_that_is_another_one_here_are_left_out(fmus):
-    written(
-        "base.yaml",
-        f"like: {PAPER_A}\n"
-        "units: {controller: null, allocator: null, wheel_control: null, reference: null}\n"
-        "connections: []\n",
-    )
+def test_values_for_a_unit_that_is_another_one_here_are_left_out():
+    gone = ", ".join(f"{unit}: null" for unit in ("controller", "allocator", "wheel_control", "reference"))
+    written("base.yaml", f"like: {PAPER_A}\nunits: {{{gone}}}\nconnections: []\n")
     written("s.yaml", "like: base\nunits: {plant: {fmu: plant_two_dof}}\n")
     assert load_scenario(Path("s.yaml")).replaced == {"plant": "plant_seven_dof"}
-
-
-def test_a_file_read_alone_is_not_like_another():
-    path = written("a.yaml", "parameters: {mass: 1}\n")
-    assert like.read(path, what="vehicle file") == yaml_lines.read(path, what="vehicle file")

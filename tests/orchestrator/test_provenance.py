@@ -70,19 +70,17 @@ def test_the_first_word_of_a_source_says_what_it_is(source, kind):
 
 
 @pytest.mark.parametrize(
-    ("comment", "origin"),
+    ("comment", "kind", "says"),
     [
-        (
-            "axle; chosen: that of the tyres; rounded",
-            ValueSource(CHOSEN, "chosen: that of the tyres; rounded"),
-        ),
-        ("erratum: printed as 12", ValueSource(ERRATUM, "erratum: printed as 12")),
-        ("wheelbase 3.05 m, chosen by nobody", ValueSource(PAPER, "wheelbase 3.05 m, chosen by nobody")),
-        ("", ValueSource(PAPER, "")),
+        ("axle; chosen: that of the tyres; rounded", CHOSEN, "chosen: that of the tyres; rounded"),
+        ("erratum: printed as 12", ERRATUM, "erratum: printed as 12"),
+        ("wheelbase 3.05 m, chosen by nobody", PAPER, "wheelbase 3.05 m, chosen by nobody"),
+        ("", PAPER, ""),
     ],
 )
-def test_a_comment_says_where_a_value_comes_from_or_else_its_file_does(comment, origin):
-    assert ValueSource.of_comment(comment, "paper A, table 1, unless a line says otherwise") == origin
+def test_a_comment_says_where_a_value_comes_from_or_else_its_file_does(comment, kind, says):
+    found = ValueSource.of_comment(comment, "paper A, table 1, unless a line says otherwise")
+    assert found == ValueSource(kind, says)
 
 
 @pytest.fixture(scope="module")
@@ -117,10 +115,8 @@ def test_the_car_s_parameters_come_from_its_file_line_by_line(groups):
     assert car["mass"].origin.kind == PAPER
     assert car["cg_to_front_axle"].origin.kind == ERRATUM
     assert mentions(car["cg_to_front_axle"].origin.says, "erratum", "12")
-    assert (car["cg_to_rear_axle"].origin.kind, car["cg_to_rear_axle"].origin.says) == (
-        CHOSEN,
-        "chosen: a guess",
-    )
+    behind = car["cg_to_rear_axle"].origin
+    assert (behind.kind, behind.says) == (CHOSEN, "chosen: a guess")
 
 
 def test_a_unit_s_parameters_come_from_the_scenario_or_else_from_the_fmu(groups):
@@ -140,13 +136,7 @@ def test_what_a_study_varies_keeps_its_source_and_shows_all_values(groups):
     assert not groups["driver: driver_sine"]["frequency"].set_by_study
 
 
-def test_constant_inputs_are_named_with_their_source(groups):
-    constants = groups["Constant inputs"]
-    assert mentions(constants["reference.velocity_x"].origin.says, "chosen", "middle")
-    assert constants["reference.friction"].origin.kind == PAPER  # as the scenario
-
-
-def test_constants_are_shown_with_their_own_values_and_meanings(folder):
+def test_constants_are_shown_with_their_own_values_sources_and_meanings(folder):
     put_fmus(folder / "fmus", components=("tyre_dugoff", "controller_sliding_mode"))
     constants = """\
   "friction*": 0.5               # chosen: all but one
@@ -155,22 +145,20 @@ def test_constants_are_shown_with_their_own_values_and_meanings(folder):
   "vertical_load_*": 3000
   yaw_rate: 0.3
 """
-    (folder / "split.yaml").write_text(
-        SCENARIO.replace("  friction: 0.7\n", constants)
-        .replace("controller_fnn", "controller_sliding_mode") + "  tyre: {fmu: tyre_dugoff}\n"
-    )  # fmt: skip
-    scenario = load_scenario(folder / "split.yaml")
-    (found,) = [
-        group.parameters
-        for group in groups_in(make_plan(scenario, fmus=folder / "fmus"))
-        if group.title == "Constant inputs"
-    ]
+    text = SCENARIO.replace("  friction: 0.7\n", constants).replace(
+        "controller_fnn", "controller_sliding_mode"
+    )
+    (folder / "split.yaml").write_text(text + "  tyre: {fmu: tyre_dugoff}\n")
+    groups = groups_in(make_plan(load_scenario(folder / "split.yaml"), fmus=folder / "fmus"))
+    (found,) = (group.parameters for group in groups if group.title == "Constant inputs")
     values = {name: next(iter(one.values)) for name, one in found.items()}
     assert values["tyre.friction_fl"] == "0.2"
     assert values["tyre.friction_fr"] == values["tyre.friction_rr"] == "0.5"
     assert "tyre.friction_*" not in found
     assert found["tyre.friction_fl"].origin.says == "chosen: ice"
     assert mentions(found["tyre.friction_fr"].origin.says, "chosen")
+    assert mentions(found["reference.velocity_x"].origin.says, "chosen", "middle")
+    assert found["controller.yaw_rate"].origin.kind == PAPER  # as the scenario
     assert found["tyre.friction_fl"].meaning.endswith("front left")
     assert values["tyre.vertical_load_*"] == "3000"
     assert "left" not in found["tyre.vertical_load_*"].meaning
@@ -188,14 +176,11 @@ def recorded(plan, folder: Path, **changes) -> Path:
     return folder
 
 
-def test_results_of_the_same_plan_are_fresh(folder, tmp_path):
-    _, plan = planned(folder)
-    assert staleness(plan, recorded(plan, tmp_path)) is None
-
-
-def test_results_of_another_plan_are_stale_and_say_why(folder, tmp_path):
+def test_results_of_the_same_plan_are_fresh_those_of_another_or_of_none_stale_with_a_reason(folder, tmp_path):
     _, plan = planned(folder)
     made = recorded(plan, tmp_path)
+    assert staleness(plan, made) is None
+    assert mentions(staleness(plan, tmp_path / "none"), "no results yet")
     assert mentions(staleness(planned(folder, "driver.amplitude=0.1")[1], made), "driver", "parameters")
     assert mentions(staleness(planned(folder, "inputs.friction=0.3")[1], made), "reference", "constants")
     assert mentions(staleness(planned(folder, stop_time=0.2)[1], made), "stop", "time")
@@ -205,25 +190,14 @@ def test_results_of_another_plan_are_stale_and_say_why(folder, tmp_path):
 def test_results_of_another_fmu_or_program_are_stale(folder, tmp_path):
     _, plan = planned(folder)
     record = json.loads((recorded(plan, tmp_path) / "run.json").read_text())
-    record["fmus"]["driver"]["sha256"] = "0" * 64
-    assert mentions(
-        staleness(plan, recorded(plan, tmp_path, key="of it", fmus=record["fmus"])),
-        "driver",
-        "driver_sine.fmu",
-    )
-    old = {**record["versions"], "numpy": "1.0"}
-    assert mentions(
-        staleness(plan, recorded(plan, tmp_path, key="of it", versions=old)), "1.0", "numpy", "place"
-    )
-    old = {**record["versions"], "orchestrator": "sources 0123456789ab"}
-    assert mentions(
-        staleness(plan, recorded(plan, tmp_path, key="of it", versions=old)), "orchestrator", "sources"
-    )
-
-
-def test_missing_failed_and_damaged_results_are_stale(folder, tmp_path):
-    _, plan = planned(folder)
-    assert mentions(staleness(plan, tmp_path / "none"), "no results yet")
+    fmus, versions = record["fmus"], record["versions"]
+    fmus["driver"]["sha256"] = "0" * 64
+    for changed_record, names in (
+        ({"fmus": fmus}, ("driver", "driver_sine.fmu")),
+        ({"versions": versions | {"numpy": "1.0"}}, ("1.0", "numpy", "place")),
+        ({"versions": versions | {"orchestrator": "sources 0123456789ab"}}, ("orchestrator", "sources")),
+    ):
+        assert mentions(staleness(plan, recorded(plan, tmp_path, key="of it", **changed_record)), *names)
 
 
 def test_results_are_up_to_date_with_another_archive_of_the_same_sources(folder, tmp_path):

@@ -7,7 +7,7 @@ from fractions import Fraction
 
 import pytest
 
-from tests.refusals import mentions, refused
+from tests.refusals import refused
 from yawbench.fmus.fmu import UnitDefinition
 from yawbench.orchestrator.scenario import quantities
 from yawbench.orchestrator.scenario.quantities import conversion, convert, measure_of, parse_unit, seconds
@@ -45,12 +45,7 @@ def test_quantity_is_converted_exactly(text: str, unit: str, value: Fraction) ->
 
 @pytest.mark.parametrize(
     ("text", "unit", "value"),
-    [
-        ("180 deg", "rad", math.pi),
-        ("5 deg/s", "rad/s", math.radians(5.0)),
-        ("30 rpm", "rad/s", math.pi),
-        ("2 N.m/deg", "N.m/rad", 2.0 * 180.0 / math.pi),
-    ],
+    [("180 deg", "rad", math.pi), ("30 rpm", "rad/s", math.pi), ("2 N.m/deg", "N.m/rad", 360.0 / math.pi)],
 )
 def test_quantity_with_pi_is_converted_to_rounding(text: str, unit: str, value: float) -> None:
     assert convert(text, unit) == pytest.approx(value, rel=1e-15)
@@ -62,18 +57,10 @@ def test_quantity_with_pi_is_converted_to_rounding(text: str, unit: str, value: 
         ("5 kg", "rad", ("'5 kg'", "rad", "deg", "mrad")),
         ("5 rad", "kg", ("'5 rad'", "kg", "g", "t")),
         ("fast", "m/s", ("'fast'", "m/s")),
-        (
-            "0,5 m",
-            "m",
-            ("'0,5 m'", "0.5 m"),
-        ),
+        ("0,5 m", "m", ("'0,5 m'", "0.5 m")),
         ("5 foo", "m", ("'foo'", "m", "mm", "cm", "km")),
         ("5 kmh", "m/s", ("'kmh'", "'km/h'")),
-        (
-            "0,0325",
-            "rad",
-            ("'0,0325'", "0.0325"),
-        ),
+        ("0,0325", "rad", ("'0,0325'", "0.0325")),
         ("5 m/", "m", ("'m/'", "'m'")),
         ("5 m/s.kg", "m", ("'m/s.kg'", "denominator", "parentheses")),
         ("5 m", "widgets", ("'5 m'", "widgets")),
@@ -84,9 +71,8 @@ def test_quantity_with_pi_is_converted_to_rounding(text: str, unit: str, value: 
 def test_what_is_no_such_quantity_is_said_in_a_sentence(
     text: str, unit: str | None, names: tuple[str, ...]
 ) -> None:
-    with pytest.raises(ValueError) as caught:
+    with refused(ValueError, names=names):
         convert(text, unit)
-    assert mentions(caught.value, *names)
 
 
 def test_every_offered_spelling_is_a_unit() -> None:
@@ -94,20 +80,23 @@ def test_every_offered_spelling_is_a_unit() -> None:
 
 
 @pytest.mark.parametrize(
-    ("a", "b", "same"),
+    ("a", "b"),
     [
-        ("N.m", "N.m", True),
-        ("N.m", "Nm", True),
-        ("m/s2", "m/s^2", True),
-        ("kg.m2", "kg*m2", True),
-        ("rad", "deg", False),
-        ("rad/s", "1/s", False),
-        ("N", "kN", False),
+        ("N.m", "Nm"), ("m/s2", "m/s^2"), ("kg.m2", "kg*m2"),
+        ("N.(m/rad)", "N.m/rad"), ("(kg.m).s-2", "N"), ("m/(s/kg)", "kg.m/s"), ("((m))", "m"),
     ],
-)
-def test_units_are_the_same_if_they_mean_the_same(a: str, b: str, same: bool) -> None:
-    assert (conversion(parse_unit(a), parse_unit(b)) == (1.0, 0.0)) is same
-    assert (conversion(parse_unit(b), parse_unit(a)) == (1.0, 0.0)) is same
+)  # fmt: skip
+def test_units_are_the_same_if_they_mean_the_same(a: str, b: str) -> None:
+    assert parse_unit(a) == parse_unit(b)
+    assert conversion(parse_unit(a), parse_unit(b)) == (1.0, 0.0)
+
+
+@pytest.mark.parametrize(("a", "b"), [("rad", "deg"), ("rad/s", "1/s"), ("N", "kN")])
+def test_units_of_another_size_or_dimension_are_not(a: str, b: str) -> None:
+    assert (1.0, 0.0) not in (
+        conversion(parse_unit(a), parse_unit(b)),
+        conversion(parse_unit(b), parse_unit(a)),
+    )
 
 
 RAD, KELVIN = (0, 0, 0, 0, 0, 0, 0, 1), (0, 0, 0, 0, 1, 0, 0, 0)
@@ -143,13 +132,6 @@ def test_a_quantity_is_converted_into_a_unit_that_only_the_fmu_defines() -> None
 
 
 @pytest.mark.parametrize(
-    ("text", "alike"), [("N.(m/rad)", "N.m/rad"), ("(kg.m).s-2", "N"), ("m/(s/kg)", "kg.m/s"), ("((m))", "m")]
-)
-def test_parentheses_may_stand_wherever_a_symbol_may(text: str, alike: str) -> None:
-    assert parse_unit(text) == parse_unit(alike)
-
-
-@pytest.mark.parametrize(
     ("value", "time"),
     [(0.001, Fraction(1, 1000)), (8, Fraction(8)), ("1 ms", Fraction(1, 1000)), (1e-5, Fraction(1, 100_000))],
 )
@@ -171,6 +153,5 @@ def test_times_are_the_fractions_that_were_written(value: object, time: Fraction
     ],
 )
 def test_what_is_no_time_is_said_in_a_sentence(value: object, names: tuple[str, ...]) -> None:
-    with pytest.raises(ValueError) as caught:
+    with refused(ValueError, names=names):
         seconds(value)
-    assert mentions(caught.value, *names)

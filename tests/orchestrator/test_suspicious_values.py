@@ -73,17 +73,12 @@ def values(made, unit):
     return {**one.parameters, **one.constants}
 
 
-def test_a_scenario_without_contradictions_has_no_remarks():
-    assert warnings_in(plan().diagnostics) == ()
-
-
 def test_a_change_of_what_the_reference_is_told_alone_names_the_tyres_that_keep_theirs():
     made = plan("inputs.friction=0.3")
     (one,) = warnings_in(made.diagnostics)
     assert (one.code, one.location.signal, one.value) == ("values-differ", "reference.friction", 0.3)
-    assert mentions(
-        one.message, "reference.friction", "0.3", "tyre.friction_*", "0.65", "--set friction=VALUE"
-    )
+    names = ("reference.friction", "0.3", "tyre.friction_*", "0.65", "--set friction=VALUE")
+    assert mentions(one.message, *names)
 
 
 @pytest.mark.parametrize(
@@ -118,14 +113,12 @@ def test_one_speed_reaches_the_plant_and_the_driver():
     assert warnings_in(made.diagnostics) == ()
 
 
-def test_friction_that_a_road_gives_is_left_to_it_and_is_that_of_the_road():
-    for given in ({"facts": "friction: 0.5"}, {"settings": "friction=0.5"}):
-        settings = [given["settings"]] if "settings" in given else []
-        facts = given.get("facts", "friction: 0.7")
-        made = plan(*settings, facts=facts, more="  road: {fmu: road_x}\n")
-        assert values(made, "reference") == {"mass": 1200.0, "friction": 0.5}
-        assert values(made, "road") == {"base_friction": 0.5}
-        assert values(made, "tyre") == {}
+@pytest.mark.parametrize(("settings", "friction"), [([], 0.5), (["friction=0.5"], 0.7)])
+def test_friction_that_a_road_gives_is_left_to_it_and_is_that_of_the_road(settings, friction):
+    made = plan(*settings, facts=f"friction: {friction}", more="  road: {fmu: road_x}\n")
+    assert values(made, "reference") == {"mass": 1200.0, "friction": 0.5}
+    assert values(made, "road") == {"base_friction": 0.5}
+    assert values(made, "tyre") == {}
 
 
 def test_a_reference_that_is_told_another_friction_than_the_roads_is_named_unless_it_is_meant():
@@ -149,23 +142,16 @@ def test_a_fact_in_the_wrong_unit_is_refused():
 
 
 def test_a_speed_held_by_the_driver_that_is_not_the_cars_is_named():
-    held = {"driver": "speed_gain: 100"}
-    assert each_mentions(
-        remarks("plant.initial_speed=80 km/h", **held),
-        ("driver.target_speed", "25 m/s", "plant.initial_speed", "22.2222 m/s", "--set speed=VALUE"),
-    )
+    names = ("driver.target_speed", "25 m/s", "plant.initial_speed", "22.2222 m/s", "--set speed=VALUE")
+    assert each_mentions(remarks("plant.initial_speed=80 km/h", driver="speed_gain: 100"), names)
     assert remarks("plant.initial_speed=80 km/h") == []  # the driver holds no speed
-    (both,) = remarks(plant="initial_speed: 20", driver="speed_gain: 100, target_speed: 30")
-    assert mentions(
-        both, "driver.target_speed", "30 m/s", "plant.initial_speed", "20 m/s", "--set speed=VALUE"
-    )
+    both = remarks(plant="initial_speed: 20", driver="speed_gain: 100, target_speed: 30")
+    assert each_mentions(both, ("driver.target_speed", "30 m/s", "plant.initial_speed", "20 m/s"))
 
 
 def test_one_mass_for_the_reference_and_another_for_the_plant_is_named():
-    assert each_mentions(
-        remarks("plant.mass=1500"),
-        ("reference.mass", "1200 kg", "plant.mass", "1500 kg", "--set vehicle.mass=VALUE", "mass"),
-    )
+    names = ("reference.mass", "1200 kg", "plant.mass", "1500 kg", "--set vehicle.mass=VALUE", "mass")
+    assert each_mentions(remarks("plant.mass=1500"), names)
 
 
 def test_two_values_that_the_scenario_gives_are_meant():
@@ -186,16 +172,14 @@ def test_another_cars_steering_ratio_is_named():
     [
         ("plant.initial_speed=90", ("plant.initial_speed", "90 m/s", "70 m/s", "'90 km/h'")),
         ("driver.amplitude=30", ("driver.amplitude", "30 rad", "12.5664 rad", "'30 deg'")),
-        (
-            "friction=65",
-            ("reference.friction", "'65 %'"),
-        ),
+        ("friction=65", ("reference.friction", "'65 %'")),
     ],
 )
 def test_a_number_that_was_meant_in_another_unit_is_named(setting, names):
     assert mentions(remarks(setting), *names)
 
 
-def test_a_speed_that_names_its_unit_is_meant():
+def test_a_scenario_without_contradictions_has_no_remarks_nor_has_a_speed_that_names_its_unit():
+    assert remarks() == []
     assert remarks("plant.initial_speed=324 km/h") == []
     assert remarks("speed=324 km/h") == []
