@@ -187,14 +187,14 @@ def _wire(text: str) -> Wire:
 
 
 class Stage:
-    """An opener for `simulate` that keeps the slaves it made."""
+    """An opener for `simulate` that keeps the slaves it made; `kinds`: what makes those of some units."""
 
-    def __init__(self, units: Mapping[str, Behaviour]) -> None:
-        self.units = units
+    def __init__(self, units: Mapping[str, Behaviour], **kinds: Callable[..., FakeSlave]) -> None:
+        self.units, self.kinds = units, kinds
         self.slaves: dict[str, FakeSlave] = {}
 
     def __call__(self, unit: Instance, log: Log, corrupted: set[Path]) -> FmuInstance:
-        slave = FakeSlave(unit, self.units[unit.name], log)
+        slave = self.kinds.get(unit.name, FakeSlave)(unit, self.units[unit.name], log)
         self.slaves[unit.name] = slave
         return slave
 

@@ -31,9 +31,9 @@ class Passing(Behaviour):
         return {"y": u["x"]}
 
 
-def fail(tmp_path, units, wires, *, opener=None, status=1, **options):
+def fail(tmp_path, units, wires, *, status=1, kinds=(), **options):
     """Run fake units to the error they make; return its sentence, the results and the slaves."""
-    stage = opener or Stage(units)
+    stage = Stage(units, **dict(kinds))
     with pytest.raises(SimulationError if status == 1 else Interrupted) as caught:
         simulate(make_plan(units, wires, **options), tmp_path, opener=stage)
     assert caught.value.exit_status == status
@@ -69,20 +69,6 @@ def test_a_failed_step_is_a_sentence_that_keeps_the_rows_before_and_frees_every_
     assert slaves["target"].worst == ERROR
 
 
-class Opener(Stage):
-    """Lets a test put its own slave in the place of one unit's."""
-
-    def __init__(self, units, name, kind):
-        super().__init__(units)
-        self.name, self.kind = name, kind
-
-    def __call__(self, unit, log, corrupted):
-        if unit.name != self.name:
-            return super().__call__(unit, log, corrupted)
-        self.slaves[unit.name] = slave = self.kind(unit, self.units[unit.name], log)
-        return slave
-
-
 def answering(status, *messages, call="step", at=3):
     """Return a kind of slave that logs and returns a status in its `at`th call of a kind."""
 
@@ -104,16 +90,26 @@ def answering(status, *messages, call="step", at=3):
     return Slave
 
 
-def answer(tmp_path, kind, *, status=1, name="target"):
-    """Run a source and a target, one of which is a slave of this kind, to the error that it makes."""
+def answer(tmp_path, kind, *, status=1):
+    """Run a source and a target, a slave of this kind, to the error that it makes."""
     units = ramp_into(lambda t: None)
-    return fail(tmp_path, units, SOURCE_TO_TARGET, opener=Opener(units, name, kind), status=status)
+    return fail(tmp_path, units, SOURCE_TO_TARGET, kinds={"target": kind}, status=status)
+
+
+def entering(act):
+    """Return a kind of slave that does this when it enters initialization."""
+
+    class Slave(FakeSlave):
+        def enter(self):
+            return act(self)
+
+    return Slave
 
 
 def go_on(tmp_path, kind):
     """Run them to the end; return instance, time and text of every warning, and the results."""
     units = ramp_into(lambda t: None)
-    info = simulate(make_plan(units, SOURCE_TO_TARGET), tmp_path, opener=Opener(units, "target", kind))
+    info = simulate(make_plan(units, SOURCE_TO_TARGET), tmp_path, opener=Stage(units, target=kind))
     return [(m.instance, m.time, m.text) for m in info.warnings], load_results(tmp_path)
 
 
@@ -154,11 +150,11 @@ def test_the_first_error_that_was_logged_is_the_reason_and_no_warning(tmp_path):
 
 
 def test_a_component_s_own_sentence_is_not_wrapped_in_another(tmp_path):
-    text = (
-        "step failed at t = 0.2 s: ValueError: 100 % too much: no (plants/a.py:7); inputs: x = 1.0, y = 2.0"
-    )
+    own = "ValueError: 100 % too much: no (plants/a.py:7)"
+    text = f"step failed at t = 0.2 s: {own}; inputs: x = 1.0, y = 2.0"
     sentence, _, _ = answer(tmp_path, answering(DISCARD, (ERROR, text)))
-    assert mentions(sentence, "target", "0.2 s", "ValueError", "100 %", "plants/a.py:7")
+    assert mentions(sentence, "target", "0.2 s", own)
+    assert sentence.count("failed at") == 1
 
 
 @pytest.mark.parametrize(("call", "what"), [("set", "inputs"), ("get", "outputs")])
@@ -184,29 +180,22 @@ def test_a_warning_without_a_message_is_reported_too(tmp_path):
 
 
 def test_an_error_logged_during_initialization_is_a_warning_if_the_status_is_ok(tmp_path):
-    class Slave(FakeSlave):
-        def enter(self):
-            self.log.add(self.name, ERROR, "", "no table of mass, -1 is taken")
-            return OK
+    def enter(slave):
+        slave.log.add(slave.name, ERROR, "", "no table of mass, -1 is taken")
+        return OK
 
-    warnings, results = go_on(tmp_path, Slave)
+    warnings, results = go_on(tmp_path, entering(enter))
     assert each_mentions(warnings, ("target", "mass", "-1"))
     assert results.time[-1] > 0
 
 
 def test_an_instance_that_cannot_be_made_frees_those_made_before(tmp_path):
-    units = {"source": Clock(x=lambda t: t), "target": Passing()}
-    stage = Stage(units)
+    def without_licence(*_):
+        raise SimulationError("target: cannot be instantiated: no licence", instance="target", time=0.0)
 
-    def opener(unit, log, corrupted):
-        if unit.name == "target":
-            raise SimulationError("target: cannot be instantiated: no licence", instance="target", time=0.0)
-        return stage(unit, log, corrupted)
-
-    with pytest.raises(SimulationError, match="no licence"):
-        simulate(make_plan(units, SOURCE_TO_TARGET), tmp_path, opener=opener)
-    assert stage.slaves["source"].freed == 1
-    assert json.loads((tmp_path / "run.json").read_text())["status"] == "failed"
+    sentence, results, slaves = answer(tmp_path, without_licence)
+    assert mentions(sentence, "no licence")
+    assert (slaves["source"].freed, results.record.status) == (1, "failed")
 
 
 @pytest.mark.parametrize("algorithm", ["jacobi", "gauss_seidel", "extrapolated"])
@@ -229,21 +218,10 @@ def test_a_failure_downstream_of_a_nan_is_blamed_on_its_source(since, time, tmp_
 
 
 def test_a_nan_from_a_unit_that_has_logged_an_error_is_explained_by_it(tmp_path):
-    class Slave(FakeSlave):
-        def connect(self, buffers):
-            calls = super().connect(buffers)
-            outputs = buffers.outputs
-
-            def get():
-                calls.get()
-                if self.time > 0.45:
-                    self.log.add(self.name, ERROR, "", "reading Real [17] failed at t = 0.5 s: KeyError: 17")
-                    outputs[:] = math.nan
-                return OK
-
-            return calls._replace(get=get)
-
-    sentence, _, _ = answer(tmp_path, Slave, name="source")
+    units = {"source": Clock(x=lambda t: math.nan if t > 0.45 else t), "target": Passing()}
+    said = ERROR, "reading Real [17] failed at t = 0.5 s: KeyError: 17"
+    kinds = {"source": answering(OK, said, call="get", at=6)}
+    sentence, _, _ = fail(tmp_path, units, SOURCE_TO_TARGET, kinds=kinds)
     assert mentions(sentence, "source", "Real", "17", "0.5 s", "KeyError")
 
 
@@ -328,27 +306,18 @@ def test_an_interrupted_run_ends_between_two_steps_and_keeps_its_results(number,
 
 
 def test_a_run_interrupted_during_initialization_has_no_rows(tmp_path):
-    class Slave(FakeSlave):
-        def enter(self):
-            os.kill(os.getpid(), signal.SIGINT)
-            return OK
-
-    sentence, results, slaves = answer(tmp_path, Slave, status=130)
+    interrupting = entering(lambda _: os.kill(os.getpid(), signal.SIGINT) or OK)
+    sentence, results, slaves = answer(tmp_path, interrupting, status=130)
     assert mentions(sentence, "initialization")
     assert (results.record.status, len(results.time)) == ("interrupted", 0)
     assert [slave.freed for slave in slaves.values()] == [1, 1]
 
 
 def test_a_failure_before_all_inputs_are_known_records_those_that_are(tmp_path):
-    class Slave(FakeSlave):
-        def enter(self):
-            return ERROR
-
     units = {"b": Echo(), "a": Mixed()}
     wires = [f"a.{name} -> b.{name}_in" for name in Mixed.outputs if name != "flag"]
-    _, results, _ = fail(
-        tmp_path, units, wires, opener=Opener(units, "b", Slave), constants={"b": {"flag_in": True}}
-    )
+    kinds = {"b": entering(lambda _: ERROR)}
+    _, results, _ = fail(tmp_path, units, wires, kinds=kinds, constants={"b": {"flag_in": True}})
     assert results.record.error.inputs == {"x_in": "nan", "flag_in": True}
 
 

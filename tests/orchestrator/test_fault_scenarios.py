@@ -212,11 +212,8 @@ def test_faults_stay_data_on_the_way_from_where_they_are_written(folder):
     assert (fault.value, fault.fault.begin) == (exact, exact)
     assert change.faults == (Fault(FaultLocation("plant", "yaw_rate"), "gain", exact, begin=exact),)
     assert mentions(str(change), "plant.yaw_rate", "0.123456789 s")
-    one, other = read_changes(faults=["a.x: bias 1 deg until 2", "a.y: none"])
-    assert one.faults == (Fault(FaultLocation("a", "x"), "bias", "1 deg", end=2.0),)
-    assert other.faults == ()
-    assert str(other) == "--fault a.y: none"
-    assert mentions(str(one), "--fault a.x", "1 deg", "2 s")
+    (none,) = read_changes(faults=["a.y: none"])
+    assert (none.faults, str(none)) == ((), "--fault a.y: none")
     both = yb.load("a.yaml").fault("gyro.yaw_rate", kind="freeze", start=exact)
     both = both.fault("gyro.yaw_rate", kind="noise", value="1 deg/s", seed=3)
     assert [(f.fault.kind, f.fault.begin, f.value) for f in both.plan().faults] == [

@@ -62,20 +62,6 @@ def test_an_input_that_only_enters_an_integration_sets_no_order() -> None:
     assert [wire.input for wire in found.direct] == ["speed"]
 
 
-def test_paper_a_is_ordered_from_the_driver_over_the_plant_to_the_tyre() -> None:
-    found = evaluated(
-        driver=fmu(steer=""),
-        reference=fmu("steer speed", yaw_rate_ref="steer speed"),
-        controller=fmu("yaw_rate_ref yaw_rate", moment="yaw_rate_ref yaw_rate"),
-        allocator=fmu("moment load", torque="moment load"),
-        plant=fmu("steer torque force", speed="", yaw_rate="", load="", slip="steer"),
-        tyre=fmu("slip load", force="slip load"),
-    )
-    assert found.order == ("driver", "plant", "reference", "controller", "allocator", "tyre")
-    assert not found.backward
-    assert not found.loops
-
-
 def test_a_cycle_of_units_that_is_none_of_variables_is_no_loop() -> None:
     found = evaluated(
         tyre=fmu("slip load", force="slip load"), plant=fmu("force", slip="", load="", acceleration="force")

@@ -10,27 +10,16 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from tests.command_line import status_of
-from tests.orchestrator.measured_files import (
-    GRAVITY,
-    SIDE,
-    SPEED,
-    TIMES,
-    YAW,
-    described,
-    read,
-    refusal,
-    rows,
-    segment,
-)
+from tests.orchestrator.measured_files import GRAVITY, SIDE, SPEED, TIMES, YAW, read, refusal, rows, segment
+from tests.refusals import mentions, refused
 from yawbench.foundation.errors import InvalidValueError, ScenarioError
-from yawbench.measurements.measurement import load_measurement
 from yawbench.measurements.segment import even_grid
 from yawbench.orchestrator.recordings.clocks import seconds_of
 from yawbench.orchestrator.recordings.units_of_loggers import unit_in_file
 from yawbench.orchestrator.scenario.quantities import parse_unit
 
 SPEED_ALONE = {"velocity_x": "v"}
+SECONDS = "{column: time, unit: s}"
 ALL = {"velocity_x": "v", "yaw_rate": "r", "acceleration_y": "a"}
 NAMES = "time [s];v [km/h];r [deg/s];a [g]"
 LINES = [f"{TIMES[k]:.2f};{3.6 * SPEED[k]:.4f};{YAW[k]:.5f};{SIDE[k]:.5f}" for k in range(TIMES.size)]
@@ -91,14 +80,12 @@ def test_the_table_is_found_in_every_form_and_gives_the_same_bits(content, tmp_p
     is_the_table(segment(tmp_path, content, ALL))
 
 
-def test_a_last_line_that_was_cut_off_is_left_out_and_told(tmp_path, capsys):
-    (tmp_path / "run.csv").write_text(TABLE[:-20])
-    made = load_measurement(described(tmp_path, "run.csv", ALL))
+def test_a_last_line_that_was_cut_off_is_left_out_and_told(tmp_path, yawbench):
+    made = read(tmp_path, TABLE[:-20], ALL)
     assert made.segments[0].time.size == TIMES.size - 1
     (note,) = [one for one in made.notes if one.code == "recording-rows"]
-    assert f"line {TIMES.size + 1}" in note.message and "cut off" in note.message
-    status_of("measured", "show", tmp_path / "measured.yaml")
-    assert "cut off" in capsys.readouterr().err
+    assert mentions(note.message, f"line {TIMES.size + 1}", "cut off")
+    assert "cut off" in yawbench("measured", "show", tmp_path / "measured.yaml")[2]
 
 
 def test_a_row_with_more_or_fewer_cells_is_refused_with_its_line(tmp_path):
@@ -164,11 +151,9 @@ def test_the_decimal_mark_belongs_to_the_file(cells, means, tmp_path):
 
 
 def test_a_file_that_does_not_show_its_decimal_mark_is_refused_unless_it_is_given(tmp_path):
-    text = "time [s];torque [N.m]\n0;1,250\n1;1,500\n"
     for cells in (["1,250", "1,500"], ["1,250", "1.500"], ["2.5", "2,5"]):
         text = "time [s];torque [N.m]\n" + "".join(f"{k};{cell}\n" for k, cell in enumerate(cells))
-        said = refusal(tmp_path, text, {"wheel_torque_fl": "torque"})
-        assert "decimal: " in said and cells[0] in said
+        assert mentions(refusal(tmp_path, text, {"wheel_torque_fl": "torque"}), "decimal: ", cells[0])
     assert numbers(tmp_path, ["1,250", "1,500"], "decimal: ','\n") == [1.25, 1.5]
     assert numbers(tmp_path, ["1,250", "1,500"], "decimal: '.'\n") == [1250.0, 1500.0]
 
@@ -176,30 +161,28 @@ def test_a_file_that_does_not_show_its_decimal_mark_is_refused_unless_it_is_give
 # Cells without a value, and rates
 
 
-def test_a_cell_without_a_value_is_a_sample_that_was_not_taken(tmp_path):
-    for blank in ("", "NaN", "-", "null", " ", "N/A", "#N/A", "1.#QNAN"):
-        text = "time [s],v [m/s]\n" + rows(lambda k, b=blank: f"{TIMES[k]},{b if k == 50 else SPEED[k]}")
-        made = segment(tmp_path, text, SPEED_ALONE)
-        kept = np.arange(TIMES.size) != 50
-        assert np.array_equal(made.time, TIMES[kept]) and np.array_equal(
-            made.signals["velocity_x"], SPEED[kept]
-        )
+@pytest.mark.parametrize("blank", ["", "NaN", "-", "null", " ", "N/A", "#N/A", "1.#QNAN"])
+def test_a_cell_without_a_value_is_a_sample_that_was_not_taken(blank, tmp_path):
+    made = segment(tmp_path, f"time [s],v [m/s]\n0,20\n1,{blank}\n2,22\n", SPEED_ALONE)
+    assert made.time.tolist() == [0.0, 2.0]
+    assert made.signals["velocity_x"].tolist() == [20.0, 22.0]
 
 
 def test_values_do_not_depend_on_the_order_of_signals(tmp_path):
     """Speed at 1 Hz, yaw rate at 10 Hz, lateral acceleration at 2 Hz, in one table."""
-    text = NAMES + "\n" + rows(
-        lambda k: (
-            f"{TIMES[k]};{'' if k % 10 else 3.6 * SPEED[k]};{YAW[k]};{'' if k % 5 else SIDE[k]}"
-        )
-    )  # fmt: skip
-    made = [segment(tmp_path, text, dict(order)) for order in permutations(ALL.items())]
-    for other in made:
-        assert np.array_equal(other.time, TIMES[TIMES <= 69.0])
-        for name in ALL:
-            assert np.array_equal(other.signals[name], made[0].signals[name])
-    assert made[0].signals["velocity_x"] == pytest.approx(SPEED[TIMES <= 69.0], abs=1e-9)
-    assert made[0].signals["yaw_rate"] == pytest.approx(np.radians(YAW[TIMES <= 69.0]), rel=1e-15)
+
+    def row(k):
+        return f"{TIMES[k]};{'' if k % 10 else 3.6 * SPEED[k]};{YAW[k]};{'' if k % 5 else SIDE[k]}"
+
+    first, *others = (
+        segment(tmp_path, NAMES + "\n" + rows(row), dict(order)) for order in permutations(ALL.items())
+    )
+    assert np.array_equal(first.time, TIMES[TIMES <= 69.0])
+    assert first.signals["velocity_x"] == pytest.approx(SPEED[TIMES <= 69.0], abs=1e-9)
+    assert first.signals["yaw_rate"] == pytest.approx(np.radians(YAW[TIMES <= 69.0]), rel=1e-15)
+    for other in others:
+        assert np.array_equal(other.time, first.time)
+        assert all(np.array_equal(other.signals[name], first.signals[name]) for name in ALL)
 
 
 def test_a_column_without_samples_or_with_one_is_refused_by_name(tmp_path, recwarn):
@@ -267,14 +250,12 @@ def test_a_clock_of_text_with_another_unit_is_refused(tmp_path):
 
 
 def test_packed_clock_times_are_read_by_their_key_and_refused_as_seconds(tmp_path):
-    cells = ["235958.50", "235959.00", "000000.00", "000100.25"]
-    assert clock(cells, tmp_path, "{column: time, unit: hhmmss}") == [0.0, 0.5, 1.5, 61.75]
+    cells, packed = ["235958.50", "235959.00", "000000.00", "000100.25"], "{column: time, unit: hhmmss}"
+    assert clock(cells, tmp_path, packed) == [0.0, 0.5, 1.5, 61.75]
     assert clock(cells, tmp_path, header="time [hhmmss]") == [0.0, 0.5, 1.5, 61.75]
     text = "time;v [m/s]\n" + "".join(f"{cell};20\n" for cell in ("115958", "115959", "120000", "120001"))
-    said = refusal(tmp_path, text, SPEED_ALONE, "{column: time, unit: s}")
-    assert "unit: hhmmss" in said and "115959" in said
-    text = text.replace("120000", "119960")
-    assert "119960" in refusal(tmp_path, text, SPEED_ALONE, "{column: time, unit: hhmmss}")
+    assert mentions(refusal(tmp_path, text, SPEED_ALONE, SECONDS), "unit: hhmmss", "115959")
+    assert "119960" in refusal(tmp_path, text.replace("120000", "119960"), SPEED_ALONE, packed)
 
 
 def test_seconds_that_pass_a_hundred_are_no_clock_times():
@@ -306,48 +287,44 @@ TYPES = {
 }
 
 
+def parquet(folder, **columns):
+    """Return the bytes of a Parquet file."""
+    pq.write_table(pa.table(columns), folder / "run.parquet")
+    return (folder / "run.parquet").read_bytes()
+
+
+OF_PARQUET = {"file": "run.parquet"}
+
+
 @pytest.mark.parametrize("times", TYPES.values(), ids=TYPES)
 def test_types_of_parquet_columns_are_respected(times, tmp_path):
-    pq.write_table(pa.table({"time": times, "v": 25.0 + 0.01 * np.arange(801)}), tmp_path / "run.parquet")
-    signals = {"velocity_x": "{column: v, unit: m/s}"}
-    path = described(tmp_path, "run.parquet", signals, "{column: time, unit: s}")
-    (made,) = load_measurement(path).segments
+    raw = parquet(tmp_path, time=times, v=25.0 + 0.01 * np.arange(801))
+    made = segment(tmp_path, raw, {"velocity_x": "{column: v, unit: m/s}"}, SECONDS, **OF_PARQUET)
     assert made.time == pytest.approx(0.01 * np.arange(801), abs=1e-12) and made.rate == pytest.approx(100.0)
 
 
-def test_parquet_columns_that_are_no_numbers_are_refused(tmp_path):
-    columns = {
-        "time": np.arange(3.0),
-        "stamp": STAMPS[:3],
-        "list": [[1.0], [2.0], [3.0]],
-        "word": ["a", "b", "c"],
-    }
-    pq.write_table(pa.table(columns), tmp_path / "run.parquet")
-    raw = (tmp_path / "run.parquet").read_bytes()
-    for column, says in (("stamp", "times, not numbers"), ("list", "lists"), ("word", "not a number")):
-        signals = {"velocity_x": f"{{column: {column}, unit: m/s}}"}
-        assert says in refusal(tmp_path, raw, signals, "{column: time, unit: s}", file="run.parquet")
+@pytest.mark.parametrize(
+    ("column", "says"),
+    [(STAMPS[:3], "times, not numbers"), ([[1.0], [2.0], [3.0]], "lists"), (["a", "b", "c"], "not a number")],
+)
+def test_parquet_columns_that_are_no_numbers_are_refused(column, says, tmp_path):
+    raw, signals = parquet(tmp_path, time=np.arange(3.0), v=column), {"velocity_x": "{column: v, unit: m/s}"}
+    assert says in refusal(tmp_path, raw, signals, SECONDS, **OF_PARQUET)
 
 
 def test_null_in_parquet_is_a_sample_that_was_not_taken(tmp_path):
-    columns = {"time": [0.0, 1.0, None, 3.0], "v": pa.array([20, None, 22, 23])}
-    pq.write_table(pa.table(columns), tmp_path / "run.parquet")
-    path = described(
-        tmp_path, "run.parquet", {"velocity_x": "{column: v, unit: m/s}"}, "{column: time, unit: s}"
-    )
-    assert load_measurement(path).segments[0].time.tolist() == [0.0, 3.0]
+    raw = parquet(tmp_path, time=[0.0, 1.0, None, 3.0], v=pa.array([20, None, 22, 23]))
+    made = segment(tmp_path, raw, {"velocity_x": "{column: v, unit: m/s}"}, SECONDS, **OF_PARQUET)
+    assert made.time.tolist() == [0.0, 3.0]
 
 
 # A clock that jumps, and the low pass
 
 
-def test_a_clock_that_is_set_while_recording_is_named_with_its_jump(tmp_path, capsys):
+def test_a_clock_that_is_set_while_recording_is_named_with_its_jump(tmp_path):
     late = [*TIMES[:3], *(1.7e9 + TIMES[3:])]
-    text = "time [s],v [m/s]\n" + "".join(f"{t:.2f},20\n" for t in late)
-    said = refusal(tmp_path, text, SPEED_ALONE)
-    assert "from 0.2 to 1700000000.3 s" in said and "value 4" in said
-    assert status_of("measured", "show", tmp_path / "measured.yaml") == 1
-    assert "1700000000.3" in capsys.readouterr().err
+    said = refusal(tmp_path, "time [s],v [m/s]\n" + "".join(f"{t:.2f},20\n" for t in late), SPEED_ALONE)
+    assert mentions(said, "from 0.2 to 1700000000.3 s", "value 4")
     with pytest.raises(InvalidValueError, match="1700000000"):
         even_grid(np.array(late))
     with pytest.raises(InvalidValueError, match="jumps"):
@@ -361,14 +338,11 @@ def test_times_that_go_back_or_occur_twice_are_told_apart(tmp_path):
     assert "1779019200.5 s occurs twice" in refusal(tmp_path, text.replace(".25", ".5"), SPEED_ALONE)
 
 
-@pytest.mark.parametrize("low_pass", ["5 Hz", "6 Hz", "300 Hz"])
+@pytest.mark.parametrize("low_pass", ["5 Hz", "300 Hz"])
 def test_a_low_pass_at_half_of_the_rate_or_above_is_refused_with_file_and_rate(low_pass, tmp_path):
-    with pytest.raises(ScenarioError) as refused:
+    with refused(ScenarioError, names=("filter.low_pass", "run.csv", "10 Hz", low_pass)) as caught:
         read(tmp_path, TABLE, ALL, more=f"filter: {{low_pass: {low_pass}}}\n")
-    (only,) = refused.value.diagnostics
-    assert "filter.low_pass" in str(only) and only.location.line == 4
-    assert "run.csv" in only.message and "10 Hz" in only.message and low_pass in only.message
-    assert "scipy" not in only.message and "Wn" not in only.message
+    assert [one.location.line for one in caught.value.diagnostics] == [4]
 
 
 # Units, and names that occur twice
@@ -377,14 +351,14 @@ def test_a_low_pass_at_half_of_the_rate_or_above_is_refused_with_file_and_rate(l
 @pytest.mark.parametrize(
     ("text", "unit", "factor"),
     [
-        ("mph", "m/s", 0.44704), ("MPH", "m/s", 0.44704), ("kph", "km/h", 1.0), ("KPH", "km/h", 1.0),
-        ("km/hr", "km/h", 1.0), ("kmh", "km/h", 1.0), ("Km/H", "km/h", 1.0), ("Meters/second", "m/s", 1.0),
+        ("mph", "m/s", 0.44704), ("KPH", "km/h", 1.0), ("km/hr", "km/h", 1.0), ("kmh", "km/h", 1.0),
+        ("Km/H", "km/h", 1.0), ("Meters/second", "m/s", 1.0),
         ("knots", "m/s", 1852.0 / 3600.0), ("deg/sec", "deg/s", 1.0), ("°/s", "deg/s", 1.0),
         ("dps", "deg/s", 1.0), ("rad/sec", "rad/s", 1.0), ("G", "m/s2", GRAVITY), ("g", "m/s2", GRAVITY),
         ("mG", "m/s2", 0.001 * GRAVITY), ("m/s/s", "m/s2", 1.0), ("M/S^2", "m/s2", 1.0),
         ("m/s²", "m/s2", 1.0),
-        ("psi", "Pa", 6894.757293168361), ("PSI", "Pa", 6894.757293168361), ("bar", "Pa", 1e5),
-        ("BAR", "Pa", 1e5), ("kPa", "Pa", 1e3), ("RPM", "rpm", 1.0), ("sec", "s", 1.0), ("msec", "ms", 1.0),
+        ("psi", "Pa", 6894.757293168361), ("BAR", "Pa", 1e5), ("kPa", "Pa", 1e3), ("RPM", "rpm", 1.0),
+        ("sec", "s", 1.0), ("msec", "ms", 1.0),
         ("°", "deg", 1.0), ("degrees", "deg", 1.0), ("ft", "m", 0.3048), ("ft-lb", "N.m", 1.3558179483314),
         ("NM", "N.m", 1.0), ("lbs", "kg", 0.45359237), ("%", "%", 1.0),
     ],
@@ -398,32 +372,31 @@ def test_units_of_loggers_are_known(text, unit, factor, tmp_path):
 
 
 def test_units_of_loggers_are_read_from_headers_and_descriptions(tmp_path):
-    text = "time [sec],v [mph],w,r [deg/sec],a [G]\n" + rows(
-        lambda k: f"{TIMES[k]},{SPEED[k] / 0.44704},{3.6 * SPEED[k]},{YAW[k]},{SIDE[k]}"
-    )
-    for speed in ("v", "{column: w, unit: kph}"):
-        made = segment(tmp_path, text, ALL | {"velocity_x": speed})
-        assert made.signals["velocity_x"] == pytest.approx(SPEED, rel=1e-12)
-        assert made.signals["acceleration_y"] == pytest.approx(GRAVITY * SIDE, rel=1e-12)
+    text = "time [sec],v [mph],w,a [G]\n0,100,10,1\n1,100,10,1\n"
+    for speed, value in (("v", 44.704), ("{column: w, unit: kph}", 10 / 3.6)):
+        made = segment(tmp_path, text, {"velocity_x": speed, "acceleration_y": "a"})
+        assert made.signals["velocity_x"] == pytest.approx([value] * 2, rel=1e-12)
+        assert made.signals["acceleration_y"] == pytest.approx([GRAVITY] * 2, rel=1e-12)
 
 
 def test_a_unit_that_is_not_known_is_no_unit_of_another_kind(tmp_path):
     text = "time [s],v [{}]\n0,1\n1,2\n"
     said = refusal(tmp_path, text.format("furlong/h"), SPEED_ALONE)
-    assert "unknown unit 'furlong/h'" in said and "m/s" in said and "fit" not in said
+    assert mentions(said, "unknown unit", "'furlong/h'", "m/s") and "fit" not in said
     assert "does not fit" in refusal(tmp_path, text.format("kg"), SPEED_ALONE)
     stated = refusal(tmp_path, text.format("m/s"), {"velocity_x": "{column: v, unit: furlong/h}"})
-    assert "furlong/h" in stated and "gain" in stated
+    assert mentions(stated, "furlong/h", "gain")
 
 
 def test_one_of_several_columns_of_a_name_is_chosen_by_number_or_header(tmp_path):
     text = "time [s],v [m/s],v [km/h],v [m/s]\n0,20,75.6,22\n1,20,75.6,22\n"
-    said = refusal(tmp_path, text, SPEED_ALONE)
-    assert "3 columns are called 'v'" in said and "'v#2' (km/h)" in said
     for column, speed in (("v#1", 20.0), ("v#2", 21.0), ("v#3", 22.0), ("'v [km/h]'", 21.0)):
-        assert segment(tmp_path, text, {"velocity_x": column}).signals["velocity_x"][0] == pytest.approx(
-            speed
-        )
-    assert "v#3" in refusal(tmp_path, text, {"velocity_x": "v#4"})
-    assert "'v [m/s]'" in refusal(tmp_path, text, {"velocity_x": "'v [m/s]'"})
-    assert "no column 'w#1'" in refusal(tmp_path, text, {"velocity_x": "w#1"})
+        made = segment(tmp_path, text, {"velocity_x": column})
+        assert made.signals["velocity_x"][0] == pytest.approx(speed)
+    for column, names in (
+        ("v", ("3 columns", "'v'", "'v#2' (km/h)")),
+        ("v#4", ("v#3",)),
+        ("'v [m/s]'", ("'v [m/s]'",)),
+        ("w#1", ("no column", "'w#1'")),
+    ):
+        assert mentions(refusal(tmp_path, text, {"velocity_x": column}), *names)

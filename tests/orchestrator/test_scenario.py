@@ -165,16 +165,19 @@ def test_what_is_no_scenario_at_all_is_said(file: Path, text: str, lines: str) -
     assert told(problems(write(text)), lines)
 
 
-def test_a_missing_file_is_said_with_a_guess(file: Path) -> None:
-    assert each_mentions(problems(Path("aa.yaml")), ("aa.yaml", "'a.yaml'"))
-    assert each_mentions(problems(Path("25mps.yaml")), ("25mps.yaml", "a.yaml"))
-
-
-def test_a_folder_and_a_binary_file_are_no_scenarios(file: Path) -> None:
-    Path("d.yaml").mkdir()
-    Path("e.yaml").write_bytes(b"\xff\xfe\x00")
-    assert each_mentions(problems(Path("d.yaml")), ("d.yaml", "scenario", "file"))
-    assert each_mentions(problems(Path("e.yaml")), ("e.yaml",))
+@pytest.mark.parametrize(
+    ("name", "code", "names"),
+    [
+        ("aa.yaml", "file-missing", "'a.yaml'"),
+        ("25mps.yaml", "file-missing", "a.yaml"),
+        ("folder.yaml", "file-unreadable", "scenario"),
+        ("binary.yaml", "file-unreadable", "scenario"),
+    ],
+)
+def test_what_cannot_be_read_is_said_with_a_guess_if_it_is_missing(file: Path, name, code, names) -> None:
+    Path("folder.yaml").mkdir()
+    Path("binary.yaml").write_bytes(b"\xff\xfe\x00")
+    assert told(problems(Path(name)), f"{code} | {name} | {names}")
 
 
 OF_CAR = ("title:", "vehicle: cars/car.yaml\ntitle:")

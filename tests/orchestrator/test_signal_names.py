@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-import csv
 import math
 import re
 import zipfile
+from itertools import product
 from pathlib import Path
 
 import pytest
 
 from tests.changed import changed
 from tests.command_line import status_of
+from tests.refusals import refused
+from yawbench.foundation.errors import WiringError
 from yawbench.metrics.expressions import evaluate, metric
 from yawbench.orchestrator.results.reader import load_results
 from yawbench.orchestrator.scenario.loader import load_scenario
@@ -19,7 +21,6 @@ from yawbench.orchestrator.signal_names import SignalName, Target, match, matchi
 from yawbench.orchestrator.wiring.make_plan import make_plan
 from yawbench.studies.experiment import plan_experiment
 from yawbench.studies.load_experiment import load_experiment
-from yawbench.studies.open_value_regions import RegionRuns
 
 UNITS = ("driver_sine", "plant_two_dof", "tyre_linear")
 
@@ -119,48 +120,44 @@ def _rename(fmu: Path, target: Path, names: dict[str, str]) -> None:
             made.writestr(item, content)
 
 
-def rows(path: Path) -> list[dict[str, str]]:
-    """Return the rows of a table by column, without the units in its header."""
-    with path.open(newline="", encoding="utf-8") as file:
-        header, *cells = csv.reader(file)
-    return [dict(zip((name.partition(" [")[0] for name in header), row, strict=True)) for row in cells]
-
-
-def test_parameters_columns_and_wires_have_such_names(folder):
+@pytest.fixture
+def results(folder):
+    """The results of a run."""
     given = ["--set", "driver.a[1]=3 deg", "--set", "driver.wave.f=1"]
     assert status_of("run", "other.yaml", *given, "--out", "out") == 0
-    results = load_results(Path("out"))
+    return load_results(Path("out"))
+
+
+METRICS = {
+    "peak(plant.x[1])": lambda made: abs(made["plant.x[1]"]).max(),
+    "peak(body.w)": lambda made: abs(made["plant.body.w"]).max(),
+    "final(plant.frame[1].y)": lambda made: made["plant.frame[1].y"][-1],
+    "rms(plant.x[1] - plant.x[1])": lambda made: 0,
+}
+
+
+def test_parameters_columns_wires_metrics_and_series_have_such_names(results, folder):
     assert {"plant.body.w", "plant.x[1]", "plant.frame[1].y"} <= set(results)
     assert results.find("body.w") is results["plant.body.w"]
     assert abs(results["plant.body.w"]).max() > 0
     assert [one.place for one in results.record.changes] == ["driver.a[1]", "driver.wave.f"]
+    for name, value in METRICS.items():
+        assert metric(name).name == name
+        assert evaluate(results, metric(name)).number == value(results)
+    series = 'inputs: {"u[1]": {file: out/results.csv, column: "plant.x[1]"}, '
+    (folder / "again.yaml").write_text(SCENARIO.split("connections:")[0].replace("inputs: {", series))
+    (read,) = plant_of(planned("again.yaml")).series.values()
+    assert read.values.tolist() == results["plant.x[1]"].tolist()
 
 
 def test_a_scenario_records_them_by_name_and_by_pattern(folder):
-    with (folder / "other.yaml").open("a") as file:
-        file.write('record: ["plant.x[1]", "plant.frame[*].y", "*.w"]\n')
-    assert (
-        status_of("run", "other.yaml", "--out", "out") == 2
-    )  # only the first dot separates: `w` of any instance
-    text = (folder / "other.yaml").read_text().replace('"*.w"', '"*.body.w"')
-    (folder / "other.yaml").write_text(text)
-    assert status_of("run", "other.yaml", "--out", "out") == 0
-    assert list(load_results(Path("out"))) == ["plant.x[1]", "plant.frame[1].y", "plant.body.w"]
-
-
-def test_metrics_take_them(folder, yawbench):
-    names = ("peak(plant.x[1])", "peak(body.w)", "final(plant.frame[1].y)", "rms(plant.x[1] - plant.x[1])")
-    status, _, said = yawbench(
-        "run", "other.yaml", "--out", "out", *(word for name in names for word in ("--metric", name))
-    )
-    assert status == 0, said
-    results = load_results(Path("out"))
-    found = {name: evaluate(results, metric(name)) for name in names}
-    assert found["peak(plant.x[1])"].number == abs(results["plant.x[1]"]).max()
-    assert found["peak(body.w)"].number == abs(results["plant.body.w"]).max()
-    assert found["final(plant.frame[1].y)"].number == results["plant.frame[1].y"][-1]
-    assert found["rms(plant.x[1] - plant.x[1])"].number == 0
-    assert [metric(name).name for name in names] == list(names)
+    record = 'record: ["plant.x[1]", "plant.frame[*].y", "*.{}w"]\n'
+    (folder / "other.yaml").write_text(SCENARIO + record.format(""))
+    with refused(WiringError, "variable-unknown", names=("'w'",)):  # only the first dot separates
+        planned("other.yaml")
+    (folder / "other.yaml").write_text(SCENARIO + record.format("body."))
+    made = [str(one) for one in planned("other.yaml").record]
+    assert made == ["plant.x[1]", "plant.frame[1].y", "plant.body.w"]
 
 
 SWEEP = """\
@@ -169,70 +166,24 @@ scenario: other.yaml
 axes:
   a: {vary: "driver.a[1]", values: [1, 2], unit: deg}
   f: {vary: driver.wave.f, values: [500, 1000], unit: mHz}
+  u: {vary: "inputs.u[1]", values: [1, 2], unit: deg}
 metrics:
   most: {metric: "peak(plant.x[1])"}
 """
 
 
-def test_levels_of_axes_are_converted_to_the_unit_of_the_parameter(folder, yawbench):
-    (folder / "sweep.yaml").write_text(SWEEP)
-    status, _, said = yawbench("sweep", "sweep.yaml", "--out", "out", "--jobs", 1)
-    assert status == 0, said
-    table = rows(folder / "out/table.csv")
-    assert [float(row["a"]) for row in table] == pytest.approx([math.radians(x) for x in (1, 1, 2, 2)])
-    assert [float(row["f"]) for row in table] == [0.5, 1.0, 0.5, 1.0]
-    assert float(table[2]["most"]) > 1.9 * float(table[0]["most"])
-
-
-def test_constants_of_inputs_are_set_by_name_and_by_instance(folder, yawbench):
+def test_levels_of_axes_are_converted_to_the_unit_of_the_parameter_or_input(folder):
     (folder / "other.yaml").write_text(SCENARIO.split("connections:")[0])
-    (folder / "sweep.yaml").write_text(
-        "title: Held\nscenario: other.yaml\naxes:\n"
-        '  held: {vary: "inputs.u[1]", values: [1, 2], unit: deg}\n'
-        "metrics:\n  most: {metric: final(plant.body.w)}\n"
-    )
-    status, _, said = yawbench("sweep", "sweep.yaml", "--out", "out", "--jobs", 1)
-    assert status == 0, said
-    assert [float(row["held"]) for row in rows(folder / "out/table.csv")] == pytest.approx(
-        [math.radians(1), math.radians(2)]
-    )
+    (folder / "sweep.yaml").write_text(SWEEP)
+    angles, rates = [math.radians(1), math.radians(2)], [0.5, 1.0]
+    plans = [job.plan for job in plan_experiment(load_experiment(folder / "sweep.yaml"), folder / "out").jobs]
+    for plan, levels in zip(plans, product(angles, rates, angles), strict=True):
+        values = {
+            key: value for one in plan.instances for key, value in (one.parameters | one.constants).items()
+        }
+        assert [values[name] for name in ("a[1]", "wave.f", "u[1]")] == pytest.approx(levels)
     plan = planned("other.yaml", changed(settings=["inputs.plant.u[1]=0.1"]))
     assert plant_of(plan).constants["u[1]"] == 0.1
-
-
-STUDY = """\
-title: Open
-runs:
-  - {name: own, scenario: other.yaml}
-metrics:
-  most: {metric: "peak(plant.x[1])"}
-claims:
-  - {says: Small, holds_if: [{run: own, metric: most, at_most: 90 deg}]}
-region:
-  points: 10
-  open_values:
-    turned: {vary: "driver.a[1]", from: 1, to: 3, unit: deg, because: "chosen: around it"}
-"""
-
-
-def test_they_are_open_values_of_a_study(folder):
-    (folder / "study.yaml").write_text(STUDY)
-    experiment = load_experiment(folder / "study.yaml")
-    runs = RegionRuns(plan_experiment(experiment, folder / "out"))
-    assert runs.touched == {"turned": ["own"]}
-    assert runs.unit("turned") == "rad"
-    assert runs.chosen_number("turned", ["own"]) == pytest.approx(math.radians(2))
-
-
-def test_recorded_results_are_series_of_inputs(folder, yawbench):
-    assert yawbench("run", "other.yaml", "--out", "out")[0] == 0
-    (folder / "again.yaml").write_text(
-        SCENARIO.split("connections:")[0].replace(
-            "inputs: {", 'inputs: {"u[1]": {file: out/results.csv, column: "plant.x[1]"}, '
-        )
-    )
-    (series,) = plant_of(planned("again.yaml")).series.values()
-    assert series.values.tolist() == load_results(folder / "out")["plant.x[1]"].tolist()
 
 
 def planned(name: str, changes=()):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import pytest
 
-from tests.command_line import status_of
 from tests.fmu_copies import put_fmus
 from tests.orchestrator.fakes import Clock, make_plan
 from tests.refusals import mentions
@@ -25,27 +24,19 @@ def test_the_expected_size_counts_time_and_the_first_row(plan_of):
 
 def test_huge_results_are_announced_with_a_way_out(plan_of, tmp_path):
     assert size_note(plan_of(10**6), tmp_path, "csv") is None
+    note = size_note(plan_of(2 * 10**7), tmp_path, "csv")
     assert mentions(
-        size_note(plan_of(2 * 10**7), tmp_path, "csv"),
-        "results.csv",
-        "3.4 GB",
-        "20000001",
-        "9 variables",
-        "'record:'",
-        "--format",
-        "1.4 GB",
+        note, "results.csv", "3.4 GB", "20000001", "9 variables", "'record:'", "--format", "1.4 GB"
     )
     assert size_note(plan_of(2 * 10**7), tmp_path, "parquet") is None
 
 
-def test_run_tells_before_it_starts(tmp_path, monkeypatch, capsys):
+def test_run_tells_before_it_starts(tmp_path, monkeypatch, yawbench):
     monkeypatch.setattr(file_formats, "HUGE", 1000)
     put_fmus(tmp_path, components=["driver_sine"])
     (tmp_path / "a.yaml").write_text("stop_time: 1\nstep_size: 0.01\nunits: {driver: {fmu: driver_sine}}\n")
     out = tmp_path / "out"
-    assert status_of("run", tmp_path / "a.yaml", "--out", out, "--fmus", tmp_path) == 0
-    first, last = capsys.readouterr().err.splitlines()
-    assert mentions(
-        first, "note", "results.csv", "7 kB", "101 rows", "3 variables", "'record:'", "--format", "3 kB"
-    )
-    assert last.startswith(f"{out}: 101 rows")
+    status, _, told = yawbench("run", tmp_path / "a.yaml", "--out", out, "--fmus", tmp_path)
+    first, last = told.splitlines()
+    assert (status, last.startswith(f"{out}: 101 rows")) == (0, True)
+    assert mentions(first, "note", "results.csv", "7 kB", "101 rows", "3 variables", "'record:'", "3 kB")

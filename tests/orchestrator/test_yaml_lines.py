@@ -1,4 +1,4 @@
-"""Aliases and merge keys of YAML files: what they come to, and where they end."""
+"""YAML files: aliases, merge keys and comments, what they come to, and where they end."""
 
 from __future__ import annotations
 
@@ -26,21 +26,17 @@ def document(tmp_path, monkeypatch):
     return read_text
 
 
-def test_a_merge_key_takes_in_what_the_mapping_does_not_give_itself(document):
-    made = document("a: &a {x: 1, y: {z: 2}}\nb:\n  y: 3\n  <<: *a\n  w: 4\n")
+def test_a_merge_key_takes_in_what_the_mapping_does_not_give_itself_with_its_line(document):
+    made = document("a: &a\n  x: 1\n  y: {z: 2}\nb:\n  y: 3\n  <<: *a\n  w: 4\n")
     assert made.data["b"] == {"x": 1, "y": 3, "w": 4}
     assert not made.errors
+    assert str(made.location(("b", "x"))) == "a.yaml:2: b.x"
+    assert str(made.location(("b", "y"))) == "a.yaml:5: b.y"
 
 
 def test_of_several_merged_mappings_the_first_one_counts(document):
     made = document("a: &a {x: 1}\nb: &b {x: 2, y: 2}\nc: {<<: [*a, *b]}\n")
     assert made.data["c"] == {"x": 1, "y": 2}
-
-
-def test_a_merged_value_has_the_line_it_stands_in_and_a_given_one_its_own(document):
-    made = document("a: &a\n  x: 1\n  y: 2\nb:\n  <<: *a\n  y: 3\n")
-    assert str(made.location(("b", "x"))) == "a.yaml:2: b.x"
-    assert str(made.location(("b", "y"))) == "a.yaml:6: b.y"
 
 
 def test_a_quoted_merge_key_is_a_name_like_any_other(document):
@@ -58,18 +54,16 @@ def test_a_mapping_that_merges_itself_is_refused(document):
     assert mentions(sentence, "a.yaml:1", "alias", "itself")
 
 
-def test_aliases_of_aliases_that_would_fill_the_memory_are_refused(document):
-    lines = ["x0: &x0 [1, 1, 1, 1, 1, 1, 1, 1, 1, 1]"]
-    lines += [f"x{n}: &x{n} [{', '.join([f'*x{n - 1}'] * 10)}]" for n in range(1, 10)]
+@pytest.mark.parametrize(
+    ("first", "next_", "line"),
+    [("[1, 1, 1, 1, 1, 1, 1, 1, 1, 1]", "[{}]", "a.yaml:5"), ("{a: 1}", "{{<<: [{}]}}", "a.yaml:6")],
+)
+def test_aliases_of_aliases_that_would_fill_the_memory_are_refused(document, first, next_, line):
+    lines = [f"x0: &x0 {first}"]
+    lines += [f"x{n}: &x{n} {next_.format(', '.join([f'*x{n - 1}'] * 10))}" for n in range(1, 10)]
     made = document("\n".join(lines))
     assert made.data is None
-    assert each_mentions(sentences(made), ("a.yaml:5", "100000"))
-
-
-def test_merge_keys_that_would_fill_the_memory_are_refused(document):
-    lines = ["x0: &x0 {a: 1}"]
-    lines += [f"x{n}: &x{n} {{<<: [{', '.join([f'*x{n - 1}'] * 10)}]}}" for n in range(1, 10)]
-    assert each_mentions(sentences(document("\n".join(lines))), ("a.yaml:6", "100000"))
+    assert each_mentions(sentences(made), (line, "100000"))
 
 
 def test_a_chain_of_aliases_too_deep_to_follow_is_refused(document):
@@ -81,8 +75,7 @@ def test_a_chain_of_aliases_too_deep_to_follow_is_refused(document):
 
 def test_a_long_list_without_aliases_is_no_bomb(document, monkeypatch):
     monkeypatch.setattr("yawbench.orchestrator.scenario.yaml_lines.ALIASED", 50)
-    numbers = list(range(100))
-    assert document(f"a: {numbers}").data == {"a": numbers}
+    assert document(f"a: {[*range(100)]}").data == {"a": [*range(100)]}
 
 
 def test_a_line_that_names_the_version_of_yaml_is_read(document):
