@@ -3,29 +3,22 @@
 from __future__ import annotations
 
 from itertools import permutations
-from pathlib import Path
 
 import pytest
 
+from tests.orchestrator.fakes import Behaviour, make_fmu
 from tests.refusals import each_mentions
-from yawbench.fmus.fmu import Fmu, Variable
+from yawbench.fmus.fmu import Fmu
 from yawbench.orchestrator.plan import Wire
 from yawbench.orchestrator.wiring.order import EvaluationOrder, evaluate
 
 
 def fmu(inputs: str = "", **outputs: str | None) -> Fmu:
     """Return an FMU with these inputs and, per output, the inputs it follows; None: not said."""
-    variables = [variable(name, "input", None) for name in inputs.split()]
-    variables += [
-        variable(name, "output", None if follows is None else tuple(follows.split()))
-        for name, follows in outputs.items()
-    ]
-    named = {v.name: v for v in variables}
-    return Fmu("x", Path("x"), Path("x"), "", "", "", "", named)
-
-
-def variable(name: str, causality: str, follows: tuple[str, ...] | None) -> Variable:
-    return Variable(name, 0, "Real", causality, "continuous", None, 0.0, None, None, "", follows)
+    behaviour = Behaviour()
+    behaviour.inputs = inputs.split()
+    behaviour.outputs = {name: None if text is None else text.split() for name, text in outputs.items()}
+    return make_fmu("x", behaviour)
 
 
 def by_names(fmus: dict[str, Fmu]) -> list[Wire]:

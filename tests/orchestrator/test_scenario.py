@@ -151,14 +151,6 @@ def test_all_mistakes_are_said_at_once_from_top_to_bottom(file: Path) -> None:
         ("- 1\n", "value-wrong-type | a.yaml:1 | [1]"),
         ("a: [1, 2\nb: 3\n", "file-not-yaml | a.yaml:2 | ',' | ']' | ':'"),
         ("a:\n\t- b\n", "file-not-yaml | a.yaml:2 | '\\t'"),
-        (
-            "a: &x [*x]\n",
-            "value-invalid | a.yaml:1: a[0]\n"
-            "key-missing | a.yaml:1\n"
-            "key-missing | a.yaml:1\n"
-            "key-missing | a.yaml:1\n"
-            "key-unknown | a.yaml:1: a",
-        ),
     ],
 )
 def test_what_is_no_scenario_at_all_is_said(file: Path, text: str, lines: str) -> None:

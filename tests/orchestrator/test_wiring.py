@@ -571,16 +571,15 @@ def test_gain_and_offset_take_plain_numbers_whatever_the_units_are(folder, given
 
 
 def test_text_has_no_gain_and_a_whole_number_a_whole_one(folder: Path) -> None:
-    make_fmu(folder / "count.fmu", outputs=[Var("n", type="Integer"), Var("word", type="String", start="")])
-    make_fmu(folder / "taker.fmu", inputs=[Var("n", type="Integer", start=0)], outputs=["y"])
-    make_fmu(folder / "reader.fmu", inputs=[Var("word", type="String", start="")], outputs=["y"])
-    units = "  a: {fmu: count}\n  b: {fmu: taker}\n  c: {fmu: reader}\n"
-    rest = "connections:\n  - {from: a.n, to: b.n, gain: 2}\n  - {from: a.word, to: c.word, gain: 2}\n"
-    assert each_mentions(
-        problems(scenario(units, rest)), ("a.yaml:9", "connections[1]", "Real", "Integer", "String")
-    )
-    rest = "connections:\n  - {from: a.n, to: b.n, gain: 0.5}\n"
-    assert each_mentions(problems(scenario(units, rest)), ("a.yaml:8", "connections[0]", "Real", "Integer"))
+    n, word = Var("n", type="Integer", start=0), Var("word", type="String", start="")
+    make_fmu(folder / "giver.fmu", outputs=[n, word])
+    make_fmu(folder / "taker.fmu", inputs=[n, word], outputs=["y"])
+    units = "  a: {fmu: giver}\n  b: {fmu: taker}\n"
+    text = "connections:\n  - {from: a.n, to: b.n, gain: 2}\n  - {from: a.word, to: b.word, gain: 2}\n"
+    where = "value-wrong-type | a.yaml:{}: connections[{}] | Real | Integer"
+    assert told(problems(scenario(units, text)), where.format(8, 1) + " | String")
+    half = text.replace("n, gain: 2", "n, gain: 0.5").replace("word, gain: 2", "word")
+    assert told(problems(scenario(units, half)), where.format(7, 0))
 
 
 def test_an_fmu_without_units_is_connected_with_a_note(folder: Path) -> None:
@@ -806,14 +805,12 @@ def test_an_input_without_a_source_is_not_sent_to_whatever_has_its_unit_of_measu
     make_fmu(
         folder / "controller_fnn.fmu",
         inputs=[Var("steer_angle", "rad"), Var("roll_rate", "rad/s"), Var("friction"), Var("brake", "N")],
-        outputs=[
-            out("torque_request_*", unit="N.m", variability="discrete"), out("roll_rate_ref", unit="rad/s"),
-        ],
-    )  # fmt: skip
-    assert each_mentions(
+        outputs=[out("torque_request_*", unit="N.m"), out("roll_rate_ref", unit="rad/s")],
+    )
+    assert told(
         problems(scenario()),
-        ("a.yaml:5", "units.controller", "controller.roll_rate", "rad/s", "plant.yaw_rate", "'inputs'"),
-        ("a.yaml:5", "units.controller", "controller.brake", "'inputs'"),
+        "input-undriven | a.yaml:5: units.controller | controller.roll_rate | rad/s | plant.yaw_rate\n"
+        "input-undriven | a.yaml:5: units.controller | controller.brake | 'inputs'",
     )
 
 

@@ -49,8 +49,9 @@ def test_a_merge_key_takes_nothing_but_mappings(document, value):
     assert each_mentions(sentences(made), ("a.yaml:2", "alias", "aliases"))
 
 
-def test_a_mapping_that_merges_itself_is_refused(document):
-    (sentence,) = sentences(document("a: &a {x: 1, <<: *a}\n"))
+@pytest.mark.parametrize("text", ["a: &a {x: 1, <<: *a}\n", "a: &a [*a]\n"])
+def test_what_holds_or_merges_itself_is_refused(document, text):
+    (sentence,) = sentences(document(text))
     assert mentions(sentence, "a.yaml:1", "alias", "itself")
 
 
