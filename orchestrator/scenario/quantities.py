@@ -301,7 +301,7 @@ def convert(
         raise InvalidValueError(f"{error}{_guess(written_unit, unit, target)}", code="unit-unknown") from None
     if source.powers != target.powers:
         raise InvalidValueError(
-            f"{text!r} is not a value in {unit}: use {listed(_spellings(unit, target), last='or')}",
+            f"{text!r} is not a value in {unit}: use {listed(spellings(unit, target), last='or')}",
             code="unit-mismatch",
         )
     value = converted(number, source, replace(target, relative=relative))
@@ -345,14 +345,15 @@ def converted(number: Fraction, source: Unit, target: Unit) -> Fraction | float:
 
 def _guess(unknown: str, unit: str, target: Unit) -> str:
     """Return "; did you mean ...?" for an unknown unit, or a list of the compatible units."""
-    fitting = _spellings(unit, target)
+    fitting = spellings(unit, target)
     plain = {re.sub(r"[^a-z0-9]", "", name.lower()): name for name in reversed([*_COMMON, *fitting])}
     likely = plain.get(re.sub(r"[^a-z0-9]", "", unknown.lower())) or closest(unknown, fitting)
     return f"; did you mean {likely!r}?" if likely else f": use {listed(fitting, last='or')}"
 
 
-def _spellings(unit: str, target: Unit) -> list[str]:
-    """Return common compatible units, `unit` first."""
+def spellings(unit: str, target: Unit | None = None) -> list[str]:
+    """Return the common units of the same dimension as `unit`, itself first; `target`: `unit`, parsed."""
+    target = target or parse_unit(unit)
     fitting = [name for name in _COMMON if parse_unit(name).powers == target.powers]
     if target.powers == _GRAVITY.powers:
         fitting.append("g")
@@ -369,7 +370,7 @@ def meant_unit(number: float, assumed: str, unit: str, fits: Callable[[float], b
         fits: returns whether a value in `unit` is plausible.
     """
     target = parse_unit(unit)
-    others = (spelling for spelling in _spellings(unit, target) if spelling != assumed)
+    others = (spelling for spelling in spellings(unit, target) if spelling != assumed)
     in_unit = (
         (spelling, converted(Fraction(number), _source(spelling, target), target)) for spelling in others
     )
@@ -388,11 +389,6 @@ def quantity_pattern(unit: str) -> str:
         symbols += [f"{prefix}{symbol}" for prefix in ("", *_PREFIXES)]
     units = "|".join(map(re.escape, sorted(symbols))) if unit in symbols else "[A-Za-zµ°%1(].*"
     return rf"^\s*[+-]?(\d+/0*[1-9]\d*|(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?)\s*({units})\s*$"
-
-
-def spellings(unit: str) -> list[str]:
-    """Return the common units of the same dimension as `unit`, itself first."""
-    return _spellings(unit, parse_unit(unit))
 
 
 def instant(value: object) -> Fraction:

@@ -84,6 +84,11 @@ class SspError(Exception):
         return Diagnostic(self.code, str(self), location=where)
 
 
+def unsupported(sentence: str, element: _Element) -> SspError:
+    """Return the error on a feature of SSP that is not read."""
+    return SspError(sentence, element, code="ssp-unsupported")
+
+
 class SspVariable(NamedTuple):
     """A variable or connector as declared by an FMU or an archive."""
 
@@ -182,10 +187,8 @@ class SspArchive:
         if address.scheme or address.netloc or not source or member.startswith(("/", "..")):
             raise SspError(f"source {source!r} is not in the archive", element)
         if element.get("sourceBase", "SSD") != "SSD":
-            raise SspError(
-                f"source {source!r} is in a component: only members of the archive are read",
-                element,
-                code="ssp-unsupported",
+            raise unsupported(
+                f"source {source!r} is in a component: only members of the archive are read", element
             )
         return member
 
@@ -317,10 +320,8 @@ def check_version(root: _Element) -> None:
     """
     version = root.get("version", "1.0")
     if not version.startswith(("1.", "2.")):
-        raise SspError(
-            f"a {etree.QName(root).localname} of SSP {short(version)}: supported are 1.0 and 2.0",
-            root,
-            code="ssp-unsupported",
+        raise unsupported(
+            f"a {etree.QName(root).localname} of SSP {short(version)}: supported are 1.0 and 2.0", root
         )
 
 
@@ -331,9 +332,7 @@ def check_type(element: _Element, allowed: str) -> None:
         SspError: it does not.
     """
     if element.get("type", allowed) != allowed:
-        raise SspError(
-            f"{element.get('type')} is not supported: only {allowed} is", element, code="ssp-unsupported"
-        )
+        raise unsupported(f"{element.get('type')} is not supported: only {allowed} is", element)
 
 
 def unit_definitions(units: Iterable[_Element]) -> dict[str, UnitDefinition]:
@@ -377,7 +376,7 @@ def linear(element: _Element) -> tuple[float, float]:
     if not kind:
         return 1.0, 0.0
     if kind != "LinearTransformation":
-        raise SspError(f"{kind} is not supported here", found, code="ssp-unsupported")
+        raise unsupported(f"{kind} is not supported here", found)
     return number(found, "factor", 1.0), number(found, "offset", 0.0)
 
 
@@ -518,80 +517,141 @@ def read_structure(archive: SspArchive, system: _Element) -> SspStructure:
     Raises:
         SspError: it has unsupported features.
     """
-    structure = SspStructure()
-    definitions = unit_definitions(system.iterfind(f"../{{{SSD}}}Units/*"))
-    _add_system(structure, archive, system, (), definitions)
-    return structure
+    reader = _StructureReader(archive, unit_definitions(system.iterfind(f"../{{{SSD}}}Units/*")))
+    reader.add_system(system, ())
+    return reader.structure
 
 
-def _add_system(
-    structure: SspStructure,
-    archive: SspArchive,
-    system: _Element,
-    path: ElementPath,
-    definitions: Mapping[str, UnitDefinition],
-) -> None:
-    structure.connectors[path] = _connectors(system, definitions)
-    for dictionary in system.iterfind(f"{{{SSD}}}SignalDictionaries/{{{SSD}}}SignalDictionary"):
-        _add_dictionary(structure, archive, dictionary, path, definitions)
-    names: set[str] = set()
-    for element in system.iterfind(f"{{{SSD}}}Elements/*"):
-        kind, name = etree.QName(element).localname, element.get("name", "")
-        if not name or name in names:
-            raise SspError(f"two elements are called {name!r}" if name else "an element has no name", element)
-        names.add(name)
-        inner = (*path, name)
-        if kind == "System":
-            _add_system(structure, archive, element, inner, definitions)
-        elif kind == "Component":
-            structure.components[inner] = _component(archive, element, inner)
-            structure.connectors[inner] = _connectors(element, definitions)
-        elif kind == "SignalDictionaryReference":
-            structure.dictionaries[inner] = _dictionary(structure, element, path)
-        else:
-            raise SspError(
-                f"an element of kind {kind} ({name}) is not supported", element, code="ssp-unsupported"
+@dataclass
+class _StructureReader:
+    """Adds systems to a structure, the innermost first."""
+
+    archive: SspArchive
+    definitions: Mapping[str, UnitDefinition]
+    """Units that the archive defines."""
+    structure: SspStructure = field(default_factory=SspStructure)
+
+    def add_system(self, system: _Element, path: ElementPath) -> None:
+        structure = self.structure
+        structure.connectors[path] = self._connectors(system)
+        for dictionary in system.iterfind(f"{{{SSD}}}SignalDictionaries/{{{SSD}}}SignalDictionary"):
+            self._add_dictionary(dictionary, path)
+        names: set[str] = set()
+        for element in system.iterfind(f"{{{SSD}}}Elements/*"):
+            kind, name = etree.QName(element).localname, element.get("name", "")
+            if not name or name in names:
+                what = f"two elements are called {name!r}" if name else "an element has no name"
+                raise SspError(what, element)
+            names.add(name)
+            inner = (*path, name)
+            if kind == "System":
+                self.add_system(element, inner)
+            elif kind == "Component":
+                structure.components[inner] = self._component(element, inner)
+                structure.connectors[inner] = self._connectors(element)
+            elif kind == "SignalDictionaryReference":
+                structure.dictionaries[inner] = self._dictionary(element, path)
+            else:
+                raise unsupported(f"an element of kind {kind} ({name}) is not supported", element)
+        for connection in system.iterfind(f"{{{SSD}}}Connections/{{{SSD}}}Connection"):
+            for source, sink in self._directed(connection, path):
+                before, _ = structure.sources.setdefault(sink, (source, connection))
+                if before != source:
+                    raise SspError(f"{sink} has more than one source: {before} and {source}", connection)
+        structure.systems[path] = system
+
+    def _add_dictionary(self, element: _Element, path: ElementPath) -> None:
+        """Add the signal dictionary of a system, whose entries every reference to it shares, as a bus."""
+        check_type(element, DICTIONARY_TYPE)
+        content = self.archive.content(element, "", f"{{{SSB}}}SignalDictionary", "signals")
+        own = {**self.definitions, **unit_definitions(content.iterfind(f"{{{SSB}}}Units/*"))}
+        name = element.get("name", "")
+        key, place = (*path, "", name), (*path, f"signal dictionary {name}")
+        self.structure.dictionaries[key] = place
+        self.structure.connectors[place] = _connectors(content, own, f"{{{SSB}}}DictionaryEntry")
+
+    def _dictionary(self, reference: _Element, path: ElementPath) -> ElementPath:
+        """Return the path of the dictionary that a reference names, in its own system or one around it."""
+        name = reference.get("dictionary", "")
+        for depth in range(len(path), -1, -1):
+            if (place := self.structure.dictionaries.get((*path[:depth], "", name))) is not None:
+                return place
+        raise SspError(
+            f"there is no signal dictionary {name!r}, to which {reference.get('name')!r} refers", reference
+        )
+
+    def _connectors(self, element: _Element) -> dict[str, SspVariable]:
+        return _connectors(element, self.definitions, f"{{{SSD}}}Connectors/{{{SSD}}}Connector")
+
+    def _component(self, element: _Element, path: ElementPath) -> SspComponent:
+        who, source = f"component {'.'.join(path)!r}", element.get("source", "")
+        kind = element.get("type", FMU_TYPE)
+        if not source:
+            raise unsupported(f"{who} names no FMU (it has no source): only FMUs can be run", element)
+        if kind != FMU_TYPE or not source.lower().endswith(".fmu"):
+            what = f"is not an FMU (type {kind}, source {source!r}): only FMUs are supported"
+            raise unsupported(f"{who} {what}", element)
+        implementation = element.get("implementation", "any")
+        if implementation not in ("any", "CoSimulation"):
+            raise unsupported(f"{who} wants {implementation}: only CoSimulation is supported", element)
+        member = self.archive.member(element)
+        return SspComponent(path, element, member, self.archive.variables(member, element))
+
+    def _directed(self, connection: _Element, path: ElementPath) -> list[tuple[SspEnd, SspEnd]]:
+        """Return source and target of a connection in the system `path`, of arrays those of every element."""
+        start, end = (self._end(connection, which, path) for which in ("start", "end"))
+        start_gives, end_gives = (self._gives(side, path) for side in (start, end))
+        if start_gives is not None and start_gives == end_gives:
+            what = "gives a value" if start_gives else "takes a value"
+            raise SspError(f"cannot connect {start} and {end}: each {what}", connection)
+        of_start, starts = self._elements_at(start, connection, "start")
+        of_end, ends = self._elements_at(end, connection, "end")
+        if len(starts) != len(ends) or (len(starts) > 1 and of_start != of_end):
+            sizes = " and ".join("x".join(map(str, shape)) or "1" for shape in (of_start, of_end))
+            raise SspError(f"cannot connect {start} and {end}: they have {sizes} elements", connection)
+        turned = start_gives is False or end_gives
+        return list(zip(ends, starts, strict=True) if turned else zip(starts, ends, strict=True))
+
+    def _elements_at(
+        self, end: SspEnd, connection: _Element, which: str
+    ) -> tuple[tuple[int, ...], list[SspEnd]]:
+        """Return the shape and elements of an end of a connection, or the one that it is restricted to."""
+        shape, elements = self.structure.elements(end)
+        text = connection.get(f"{which}Indices")
+        if text is None:
+            return shape, elements
+        at = _whole(text.split())
+        if not at or len(at) != len(shape) or not all(1 <= i <= n for i, n in zip(at, shape, strict=True)):
+            size = (
+                f"it has {'x'.join(map(str, shape))} elements, counted from 1" if shape else "it is no array"
             )
-    for connection in system.iterfind(f"{{{SSD}}}Connections/{{{SSD}}}Connection"):
-        for source, sink in _directed(structure, connection, path):
-            before, _ = structure.sources.setdefault(sink, (source, connection))
-            if before != source:
-                raise SspError(f"{sink} has more than one source: {before} and {source}", connection)
-    structure.systems[path] = system
+            raise SspError(f"{which}Indices {text!r} is no element of {end}: {size}", connection)
+        return (), [SspEnd(end.element, f"{elements[0].name.rpartition('[')[0]}[{','.join(map(str, at))}]")]
 
+    def _end(self, connection: _Element, which: str, path: ElementPath) -> SspEnd:
+        known = self.structure
+        element, name = connection.get(f"{which}Element"), connection.get(f"{which}Connector", "")
+        inner = (*path, element) if element else path
+        inner = known.dictionaries.get(inner, inner)
+        if inner not in known.connectors:
+            sentence = f"a connection names {element!r}: there is no such component"
+            raise SspError(sentence, connection, code="file-missing")
+        if inner not in known.components and name not in known.connectors[inner]:
+            of = "the " if inner in known.dictionaries.values() else "the system "
+            system = of + ".".join(inner) if inner else "the system"
+            sentence = f"a connection names the connector {name!r}: {system} has none of this name"
+            raise SspError(sentence, connection)
+        return SspEnd(inner, name)
 
-def _add_dictionary(
-    structure: SspStructure,
-    archive: SspArchive,
-    element: _Element,
-    path: ElementPath,
-    definitions: Mapping[str, UnitDefinition],
-) -> None:
-    """Add the signal dictionary of a system, whose entries every reference to it shares, as a bus."""
-    check_type(element, DICTIONARY_TYPE)
-    content = archive.content(element, "", f"{{{SSB}}}SignalDictionary", "signals")
-    own = {**definitions, **unit_definitions(content.iterfind(f"{{{SSB}}}Units/*"))}
-    name = element.get("name", "")
-    key, place = (*path, "", name), (*path, f"signal dictionary {name}")
-    structure.dictionaries[key] = place
-    structure.connectors[place] = _connectors(content, own, f"{{{SSB}}}DictionaryEntry")
-
-
-def _dictionary(structure: SspStructure, reference: _Element, path: ElementPath) -> ElementPath:
-    """Return the path of the dictionary that a reference names, in its own system or one around it."""
-    name = reference.get("dictionary", "")
-    for depth in range(len(path), -1, -1):
-        if (place := structure.dictionaries.get((*path[:depth], "", name))) is not None:
-            return place
-    raise SspError(
-        f"there is no signal dictionary {name!r}, to which {reference.get('name')!r} refers", reference
-    )
+    def _gives(self, end: SspEnd, path: ElementPath) -> bool | None:
+        """Return whether an end is a source in the system `path`, None if undeclared."""
+        declared = self.structure.variable(end) or self.structure.connector(end)
+        gives = _GIVES.get(declared.causality or "")
+        return gives if gives is None or end.element != path else not gives
 
 
 def _connectors(
-    element: _Element,
-    definitions: Mapping[str, UnitDefinition],
-    tag: str = f"{{{SSD}}}Connectors/{{{SSD}}}Connector",
+    element: _Element, definitions: Mapping[str, UnitDefinition], tag: str
 ) -> dict[str, SspVariable]:
     connectors: dict[str, SspVariable] = {}
     for connector in element.iterfind(tag):
@@ -600,89 +660,3 @@ def _connectors(
         declared = SspVariable(connector.get("kind", ""), unit, definitions.get(str(unit)), shape=shape)
         connectors.update(_elements(str(connector.get("name")), declared))
     return connectors
-
-
-def _component(archive: SspArchive, element: _Element, path: ElementPath) -> SspComponent:
-    name, kind, source = ".".join(path), element.get("type", FMU_TYPE), element.get("source", "")
-    if not source:
-        raise SspError(
-            f"component {name!r} names no FMU (it has no source): only FMUs can be run",
-            element,
-            code="ssp-unsupported",
-        )
-    if kind != FMU_TYPE or not source.lower().endswith(".fmu"):
-        raise SspError(
-            f"component {name!r} is not an FMU (type {kind}, source {source!r}): only FMUs are supported",
-            element,
-            code="ssp-unsupported",
-        )
-    implementation = element.get("implementation", "any")
-    if implementation not in ("any", "CoSimulation"):
-        raise SspError(
-            f"component {name!r} wants {implementation}: only CoSimulation is supported",
-            element,
-            code="ssp-unsupported",
-        )
-    member = archive.member(element)
-    return SspComponent(path, element, member, archive.variables(member, element))
-
-
-def _directed(
-    structure: SspStructure, connection: _Element, path: ElementPath
-) -> list[tuple[SspEnd, SspEnd]]:
-    """Return source and target of a connection in the system `path`, of arrays those of every element."""
-    start, end = (_end(structure, connection, which, path) for which in ("start", "end"))
-    start_gives, end_gives = (_gives(structure, side, path) for side in (start, end))
-    if start_gives is not None and start_gives == end_gives:
-        what = "gives a value" if start_gives else "takes a value"
-        raise SspError(f"cannot connect {start} and {end}: each {what}", connection)
-    shapes, elements = zip(
-        *(_elements_at(structure, e, connection, w) for e, w in ((start, "start"), (end, "end"))), strict=True
-    )
-    if len(elements[0]) != len(elements[1]) or (len(elements[0]) > 1 and shapes[0] != shapes[1]):
-        sizes = " and ".join("x".join(map(str, shape)) or "1" for shape in shapes)
-        raise SspError(f"cannot connect {start} and {end}: they have {sizes} elements", connection)
-    turned = start_gives is False or end_gives
-    return list(zip(*(reversed(elements) if turned else elements), strict=True))
-
-
-def _elements_at(
-    structure: SspStructure, end: SspEnd, connection: _Element, which: str
-) -> tuple[tuple[int, ...], list[SspEnd]]:
-    """Return the shape and the elements of an end of a connection, or the one that it is restricted to."""
-    shape, elements = structure.elements(end)
-    text = connection.get(f"{which}Indices")
-    if text is None:
-        return shape, elements
-    at = _whole(text.split())
-    if not at or len(at) != len(shape) or not all(1 <= i <= n for i, n in zip(at, shape, strict=True)):
-        size = f"it has {'x'.join(map(str, shape))} elements, counted from 1" if shape else "it is no array"
-        raise SspError(f"{which}Indices {text!r} is no element of {end}: {size}", connection)
-    return (), [SspEnd(end.element, f"{elements[0].name.rpartition('[')[0]}[{','.join(map(str, at))}]")]
-
-
-def _end(structure: SspStructure, connection: _Element, which: str, path: ElementPath) -> SspEnd:
-    element, name = connection.get(f"{which}Element"), connection.get(f"{which}Connector", "")
-    inner = (*path, element) if element else path
-    inner = structure.dictionaries.get(inner, inner)
-    if inner not in structure.connectors:
-        raise SspError(
-            f"a connection names {element!r}: there is no such component", connection, code="file-missing"
-        )
-    if inner not in structure.components and name not in structure.connectors[inner]:
-        of = "the " if inner in structure.dictionaries.values() else "the system "
-        system = of + ".".join(inner) if inner else "the system"
-        raise SspError(
-            f"a connection names the connector {name!r}: {system} has none of this name", connection
-        )
-    return SspEnd(inner, name)
-
-
-def _gives(structure: SspStructure, end: SspEnd, path: ElementPath) -> bool | None:
-    """Return whether an end is a source in the system `path`, None if undeclared."""
-    kind = structure.connector(end).causality
-    if end.element in structure.components:
-        declared = structure.components[end.element].variables.get(end.name)
-        kind = declared.causality if declared else kind
-    gives = _GIVES.get(kind or "")
-    return gives if gives is None or end.element != path else not gives

@@ -60,6 +60,7 @@ from .ssp_archive import (
     required,
     transformation,
     unit_definitions,
+    unsupported,
 )
 from .yaml_lines import Document
 
@@ -517,7 +518,7 @@ def _values(parameter: _Element) -> Array:
     (element,) = kinds
     kind, text = etree.QName(element).localname, element.get("value")
     if kind not in (*REALS, *INTEGERS, *TEXTS, "Boolean"):
-        raise SspError(f"{name} is of type {kind}: not supported", parameter, code="ssp-unsupported")
+        raise unsupported(f"{name} is of type {kind}: not supported", parameter)
     inner = list(element.iterchildren("{*}*"))
     if (text is None) == (not inner):
         what = "no value" if text is None else "values both as an attribute and as elements"

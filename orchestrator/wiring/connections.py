@@ -250,26 +250,17 @@ class Connector:
         if self._system.had([instance], pattern, kind):
             self._system.left_out(dotted(key[:2]), f"{instance} has no {kind} {pattern!r} any more")
             return
-        variable = self._fmus[instance].variables.get(pattern)
+        fmu = self._fmus[instance]
+        variable = fmu.variables.get(pattern)
         if variable is not None:
-            self._report(
-                key,
-                f"{instance}.{pattern} is not an {kind}: its causality is {variable.causality}"
-                + (f", and {variable.variability}" if variable.causality in PARAMETERS else ""),
-                "variable-wrong-kind",
-            )
-            return
-        if pattern in self._fmus[instance].refused:
-            self._report(
-                key, f"{instance}.{pattern} {self._fmus[instance].refused[pattern]}", "variable-unsupported"
-            )
-            return
-        names = fold([v.name for v in self._fmus[instance].of(kind)])
-        self._report(
-            key,
-            f"{instance} has no {kind} {pattern!r}{hint(pattern, names, lead='it has')}",
-            "variable-unknown",
-        )
+            more = f", and {variable.variability}" if variable.causality in PARAMETERS else ""
+            sentence = f"{instance}.{pattern} is not an {kind}: its causality is {variable.causality}{more}"
+            self._report(key, sentence, "variable-wrong-kind")
+        elif pattern in fmu.refused:
+            self._report(key, f"{instance}.{pattern} {fmu.refused[pattern]}", "variable-unsupported")
+        else:
+            likely = hint(pattern, fold([v.name for v in fmu.of(kind)]), lead="it has")
+            self._report(key, f"{instance} has no {kind} {pattern!r}{likely}", "variable-unknown")
 
     def _by_names(self, wires: dict[Input, tuple[Wire, KeyPath]], taken: Set[Input]) -> set[Input]:
         """Add wires between equal names, except to inputs `taken`; return inputs with several candidates."""
@@ -337,12 +328,9 @@ class Connector:
     def _note_untold(self, untold: Mapping[str, Sequence[Variable]]) -> None:
         for instance, inputs in untold.items():
             values = ", ".join(f"{v.name} = {v.start}{f' {v.unit}' if v.unit else ''}" for v in inputs)
-            have = (
-                "has no source and keeps its start value"
-                if len(inputs) == 1
-                else ("have no source and keep their start values")
-            )
-            what = "input" if len(inputs) == 1 else "inputs"
+            what, have = "input", "has no source and keeps its start value"
+            if len(inputs) > 1:
+                what, have = "inputs", "have no source and keep their start values"
             self._system.note("input-kept", f"{what} of {instance} {have}: {values}")
 
     def _similar(self, instance: str, variable: Variable) -> list[str]:
@@ -452,16 +440,11 @@ class Connector:
                 {(instance, v.unit): None for instance, v in ends if v.unit and contradicts_its_name(v)}
             )
         for instance, names in missing.items():
-            text = listed(fold(list(dict.fromkeys(names))))
-            self._system.note(
-                "unit-missing",
-                f"{instance} ({self._fmus[instance].name}) declares no unit for {text}: not checked",
-            )
+            what = f"declares no unit for {listed(fold(list(dict.fromkeys(names))))}: not checked"
+            self._system.note("unit-missing", f"{instance} ({self._fmus[instance].name}) {what}")
         for instance, measure in odd:
-            who = f"{instance} ({self._fmus[instance].name})"
-            self._system.note(
-                "unit-unusual", f"{who} defines {measure} otherwise than usual: taken as it defines it"
-            )
+            what = f"defines {measure} otherwise than usual: taken as it defines it"
+            self._system.note("unit-unusual", f"{instance} ({self._fmus[instance].name}) {what}")
 
 
 def conversion_between(source: Variable, target: Variable) -> tuple[float, float] | None:

@@ -294,11 +294,8 @@ def _instance(
     system: WiringContext, name: str, parameters: dict[str, Value], inputs: Mapping[str, Value | InputSeries]
 ) -> Instance:
     """Return an instance with the values of its parameters and of the inputs without a wire."""
-    spec, step, start = (
-        system.scenario.units[name],
-        system.scenario.step_size,
-        float(system.scenario.start_time),
-    )
+    scenario = system.scenario
+    spec, step, start = scenario.units[name], scenario.step_size, float(scenario.start_time)
     return Instance(
         name,
         system.fmus[name],
