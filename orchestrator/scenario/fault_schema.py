@@ -15,7 +15,7 @@ from yawbench.fmus.fmu import Value
 from yawbench.foundation.errors import Location, ScenarioError
 from yawbench.foundation.messages import listed, short
 
-from ..fault_kinds import KINDS, NO_FAULTS, WORDS, Fault, FaultList, FaultLocation
+from ..fault_kinds import KINDS, NO_FAULTS, WORDS, Fault, FaultKind, FaultList, FaultLocation
 from . import quantities, yaml_lines
 from .schema_validation import Instant, OneOf, StrictModel, Time, in_unit, validate
 
@@ -103,18 +103,18 @@ FaultValue = Annotated[
 Share = Annotated[float, PlainValidator(_share), WithJsonSchema(in_unit("%", exclusiveMinimum=0, maximum=1))]
 
 
+def _options_of(kind: FaultKind) -> tuple[list[str], list[str]]:
+    """Return the keys that a kind of fault does not take, and those that it needs."""
+    takes = {"value": kind.unit is not None, "share": kind.shared, "seed": kind.drawn, "every": kind.drawn}
+    needs = {"share": kind.shared, "value": takes["value"] and kind.needs and kind.default is None}
+    return [name for name, taken in takes.items() if not taken], [name for name, due in needs.items() if due]
+
+
 def _rules_of_kinds() -> dict[str, Any]:
     """Return the JSON Schema of the keys that each kind of fault takes."""
     rules = []
     for name, kind in KINDS.items():
-        barred = [
-            *(["value"] if kind.unit is None else []),
-            *([] if kind.shared else ["share"]),
-            *([] if kind.drawn else ["seed", "every"]),
-        ]
-        needed = ["share"] if kind.shared else []
-        if kind.unit is not None and kind.needs and kind.default is None:
-            needed.append("value")
+        barred, needed = _options_of(kind)
         then = {"properties": dict.fromkeys(barred, False), "required": needed}
         rules.append({"if": {"properties": {"kind": {"const": name}}}, "then": then})
     return {"allOf": rules}
@@ -139,16 +139,14 @@ class FaultSpec(StrictModel):
     @model_validator(mode="after")
     def _consistent(self) -> FaultSpec:
         kind = KINDS[self.kind]
-        if kind.unit is None and self.value is not None:
-            raise ValueError(f"{self.kind} takes no value")
-        if kind.unit is not None and kind.needs and kind.default is None and self.value is None:
-            raise ValueError(f"{self.kind} needs a value: {kind.does}")
-        if kind.shared != (self.share is not None):
-            needs = "needs a share of the messages" if kind.shared else "takes no share"
-            raise ValueError(f"{self.kind} {needs}")
-        for name in () if kind.drawn else ("seed", "every"):
+        barred, needed = _options_of(kind)
+        for name in barred:
             if getattr(self, name) is not None:
-                raise ValueError(f"{self.kind} takes no {name}: nothing of it is random")
+                why = ": nothing of it is random" if name in ("seed", "every") else ""
+                raise ValueError(f"{self.kind} takes no {name}{why}")
+        for name in needed:
+            if getattr(self, name) is None:
+                raise ValueError(f"{self.kind} needs a {name}: {kind.does}")
         if self.begin is not None and self.end is not None and not self.begin < self.end:
             raise ValueError(f"until must be after from, {float(self.begin):g} s (got {float(self.end):g} s)")
         return self

@@ -124,7 +124,7 @@ KINDS = ("a scenario", "a study file", "a sweep file", "a tuning file", "a vehic
 )
 def test_the_shell_completes_names(yawbench, monkeypatch, words, completed):
     monkeypatch.setattr(sys, "argv", ["yawbench"])
-    monkeypatch.setattr(sys.modules["__main__"], "__package__", "")  # else it is `python -m` to click
+    monkeypatch.setattr(sys.modules["__main__"], "__package__", "", raising=False)  # not run by `python -m`
     monkeypatch.setenv("_YAWBENCH_COMPLETE", "complete_bash")
     monkeypatch.setenv("COMP_WORDS", f"yawbench {words}")
     monkeypatch.setenv("COMP_CWORD", str(len(words.split())))
