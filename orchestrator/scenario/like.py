@@ -37,7 +37,7 @@ def read(path: Path, *, what: str, above: tuple[Path, ...] = ()) -> Document:
         above: the files that are like this one, for messages about circles.
     """
     document = yaml_lines.read(path, what=what)
-    name = document.data.get(LIKE) if isinstance(document.data, dict) else None
+    name = yaml_lines.at(document.data, (LIKE,))
     if not isinstance(name, str) or not name:
         return document
     chain = (*above, path)

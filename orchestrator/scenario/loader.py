@@ -16,7 +16,7 @@ from ..plan import Override
 from . import like, overrides, quantities, schema_validation, yaml_lines
 from .catalogue import ARCHIVES, FMU, beside
 from .schema import Connection, LoadedScenario, PropertyFile, ScenarioSpec, Vehicle, endpoint
-from .yaml_lines import Document, KeyPath
+from .yaml_lines import Document, KeyPath, mapping
 
 STEPS = 1_000_000_000
 """Maximum number of steps of a run. Chosen: about as many as a computer makes in a day."""
@@ -87,8 +87,8 @@ def load_scenario(
 
 def _swapped_by_likeness(document: Document) -> dict[str, str]:
     """Return instance -> its FMU in the file that this one is like, where it has another one here."""
-    first, instances = document.origin(), (document.data or {}).get("units") if document.like else None
-    before = {name: yaml_lines.at(first.data, ("units", name, "fmu")) for name in instances or ()}
+    first, instances = document.origin(), mapping(document.data, "units") if document.like else {}
+    before = {name: yaml_lines.at(first.data, ("units", name, "fmu")) for name in instances}
     return {
         name: fmu
         for name, fmu in before.items()
@@ -126,7 +126,7 @@ def _missing_times(document: Document, lacks: str) -> list[Diagnostic]:
 
 
 def _read_vehicle(document: Document, read: Callable[..., Document]) -> Document:
-    name = document.data.get("vehicle") if isinstance(document.data, dict) else None
+    name = yaml_lines.at(document.data, ("vehicle",))
     if not isinstance(name, str):
         return Document(document.path, data={})
     vehicle = beside(document.path, name, "a vehicle file")
@@ -169,46 +169,41 @@ def _read_tyres(
 
 def _check_time_grid(document: Document) -> None:
     """Report every time that is not an integer multiple of the communication step."""
-    data = document.data
-    step = _seconds(data.get("step_size"))
+    data, exact = document.data, quantities.exact_text
+    step, stop = _seconds(data.get("step_size")), _seconds(data.get("stop_time"))
     if step is None:
         return
-    start, stop = _read(quantities.instant, data.get("start_time", 0)), _seconds(data.get("stop_time"))
-    if start is not None and stop is not None and not start < stop:
-        what = f"must be after start_time, {float(start):.12g} s (got {float(stop):.12g} s)"
-        document.report(("stop_time",), what, "time-grid-invalid")
-        return
-    if stop is not None and (stop - (start or 0)) / step > STEPS:
-        steps = float((stop - (start or 0)) / step)
-        document.report(
-            ("stop_time",),
-            f"a run has at most {STEPS:,} steps (this would have {steps:.3g})",
-            "time-grid-invalid",
-        )
-        return
-    times: list[tuple[KeyPath, object]] = [(("stop_time",), None if stop is None else stop - (start or 0))]
-    instances = data.get("units")
-    for name, instance in instances.items() if isinstance(instances, dict) else ():
-        if isinstance(instance, dict):
-            times.append((("units", name, "step_size"), instance.get("step_size")))
-    for key, value in times:
+    start = _read(quantities.instant, data.get("start_time", 0)) or Fraction(0)
+    if stop is not None:
+        steps, wrong = (stop - start) / step, ""
+        if stop <= start:
+            wrong = f"must be after start_time, {float(start):.12g} s (got {float(stop):.12g} s)"
+        elif steps > STEPS:
+            wrong = f"a run has at most {STEPS:,} steps (this would have {float(steps):.3g})"
+        if wrong:
+            document.report(("stop_time",), wrong, "time-grid-invalid")
+            return
+    times: list[tuple[KeyPath, object, Fraction]] = []  # key, time, and whence it counts
+    if stop is not None:
+        times.append((("stop_time",), stop - start, start))
+    for name in mapping(data, "units"):
+        key = ("units", name, "step_size")
+        times.append((key, yaml_lines.at(data, key), Fraction(0)))
+    for key, value, begin in times:
         time = _seconds(value)
         if time is None or time % step == 0:
             continue
         below = time // step * step
-        from_start = (start or 0) if key == ("stop_time",) else 0
         change = document.override(("step_size",))
         origin = f" ({change})" if change else ""
-        allowed = [t + from_start for t in (below, below + step) if t > 0]
-        exact = quantities.exact_text
-        nearest = listed([f"{exact(t)} s" for t in allowed], last="or")
-        after = f" from {exact(Fraction(from_start))} s on" if from_start else ""
+        allowed = [f"{exact(t + begin)} s" for t in (below, below + step) if t > 0]
+        after = f" from {exact(begin)} s on" if begin else ""
         meant = _unrounded(step)
         fraction = f"; did you mean step_size: {meant} s?" if meant and time % meant == 0 else ""
         document.report(
             key,
             f"{exact(time)} s{after} is not an integer multiple of the communication step "
-            f"{exact(step)} s{origin}; nearest allowed: {nearest}{fraction}",
+            f"{exact(step)} s{origin}; nearest allowed: {listed(allowed, last='or')}{fraction}",
             "time-grid-invalid",
         )
 

@@ -39,7 +39,7 @@ from . import yaml_lines
 from .fault_schema import FaultSpec, location_of, parse_faults, read_line
 from .quantities import instant, seconds
 from .schema import ScenarioSpec, Vehicle, key_of, plain_value
-from .yaml_lines import Document, KeyPath, at, put
+from .yaml_lines import Document, KeyPath, at, mapping, put
 
 
 def read_changes(
@@ -197,7 +197,7 @@ def apply_changes(
     """
     replaced: dict[str, str] = {}
     effective: list[Override] = []
-    instances = _mapping(document.data, "units")
+    instances = mapping(document.data, "units")
     for change in {change.target: change for change in changes}.values():
         kind, holder, name = change.target.kind, change.target.instance, change.target.variable
         spec = instances.get(holder)
@@ -267,10 +267,8 @@ def _put_tyres(document: Document, vehicle: Document, change: Override) -> bool:
     """Override tyre property files, relative to the working directory; return whether they differ."""
     file = os.path.abspath(str(change.value))
     axle = change.target.variable
-    holder = next(
-        (d for d in (document, vehicle) if isinstance(d.data, dict) and d.data.get(TYRES)), document
-    )
-    before = holder.data.get(TYRES) if isinstance(holder.data, dict) else None
+    holder = next((d for d in (document, vehicle) if at(d.data, (TYRES,))), document)
+    before = at(holder.data, (TYRES,))
     named = before if isinstance(before, dict) else {"front": before, "rear": before}
     named = {key: os.path.abspath(holder.path.parent / str(name)) for key, name in named.items() if name}
     after = {"front": file, "rear": file} if not axle else named | {axle: file}
@@ -280,7 +278,7 @@ def _put_tyres(document: Document, vehicle: Document, change: Override) -> bool:
 
 def leave_unvalidated(document: Document) -> None:
     """Let every instance use its FMU even if the model description is invalid."""
-    for name in _mapping(document.data, "units"):
+    for name in mapping(document.data, "units"):
         document.data = put(document.data, ("units", name, "validate"), False)
 
 
@@ -306,12 +304,6 @@ def _put(document: Document, key: KeyPath, change: Override, value: Any = None) 
 
 def _differ(before: Any, after: Any) -> bool:
     return before != after or isinstance(before, bool) != isinstance(after, bool)
-
-
-def _mapping(data: Any, name: str) -> dict[str, Any]:
-    """Return data[name] if both are mappings, else an empty mapping: the schema reports the error."""
-    inner = data.get(name) if isinstance(data, dict) else None
-    return inner if isinstance(inner, dict) else {}
 
 
 def changed(changes: Iterable[Override]) -> str:

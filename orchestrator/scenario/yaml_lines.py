@@ -143,6 +143,12 @@ def at(holder: Any, key: Sequence[str | int]) -> Any:
     return holder
 
 
+def mapping(holder: Any, *key: str | int) -> dict[str, Any]:
+    """Return the mapping at a key; an empty one if something else is there: the schema reports it."""
+    found = at(holder, key)
+    return found if isinstance(found, dict) else {}
+
+
 def put(holder: Any, key: Sequence[str | int], value: Any) -> Any:
     """Return nested mappings and models with another value at a key; what holds it is copied.
 
