@@ -186,9 +186,9 @@ def _check_time_grid(document: Document) -> None:
     times: list[tuple[KeyPath, object, Fraction]] = []  # key, time, and whence it counts
     if stop is not None:
         times.append((("stop_time",), stop - start, start))
-    for name in mapping(data, "units"):
-        key = ("units", name, "step_size")
-        times.append((key, yaml_lines.at(data, key), Fraction(0)))
+    for name, instance in mapping(data, "units").items():
+        own = yaml_lines.at(instance, ("step_size",))
+        times.append((("units", name, "step_size"), own, Fraction(0)))
     for key, value, begin in times:
         time = _seconds(value)
         if time is None or time % step == 0:
