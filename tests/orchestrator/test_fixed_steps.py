@@ -55,30 +55,35 @@ def said(folder: Path, *settings: str, step: str = "0.001", own: str = "") -> li
     return [d for d in plan.diagnostics if d.code == "instance-step-differs"]
 
 
-@pytest.mark.parametrize("attributes", ["", 'canHandleVariableCommunicationStepSize="false"'])
+PARTICULAR = 'canHandleVariableCommunicationStepSize="false"'
+
+
+@pytest.mark.parametrize("attributes", ["", PARTICULAR])
 def test_another_step_than_an_fmu_declares_is_a_warning_with_both(attributes, tmp_path):
     fmi2(tmp_path, attributes)
     (warning,) = said(tmp_path)
-    assert warning.severity == "warning"
-    assert warning.location.signal == "one.step_size"
-    assert warning.value == 0.001
+    assert (warning.severity, warning.location.signal, warning.value) == ("warning", "one.step_size", 0.001)
     assert "0.001 s" in warning.message
     assert "0.01 s" in warning.message
 
 
-def test_an_fmu_that_takes_any_step_or_prefers_none_gets_any(tmp_path):
-    fmi2(tmp_path, 'canHandleVariableCommunicationStepSize="true"')
-    assert not said(tmp_path)
-    fmi2(tmp_path, experiment='stopTime="1"')
-    assert not said(tmp_path)
-
-
 @pytest.mark.parametrize(
-    ("step", "own"),
-    [("0.01", ""), ("0.001", "0.01"), ("0.005", "10 ms"), ("1/100", "")],
+    ("write", "attributes", "experiment", "step", "own"),
+    [
+        (fmi2, PARTICULAR.replace("false", "true"), 'stepSize="0.01"', "0.001", ""),
+        (fmi2, "", 'stopTime="1"', "0.001", ""),
+        *(
+            (fmi2, "", 'stepSize="0.01"', *steps)
+            for steps in (("1/100", ""), ("0.001", "0.01"), ("0.005", "10 ms"))
+        ),
+        (fmi2, "", 'stepSize="0.0333333333"', "1/30", ""),  # rounded in the description
+        (fmi3, "", 'stepSize="0.01"', "0.01", ""),
+        (fmi3, 'fixedInternalStepSize="1e-2"', "", "0.01", ""),
+        (fmi3, 'fixedInternalStepSize="1e-2"', "", "0.1", ""),
+    ],
 )
-def test_the_declared_step_is_no_warning(step, own, tmp_path):
-    fmi2(tmp_path)
+def test_a_step_that_an_fmu_takes_is_no_warning(write, attributes, experiment, step, own, tmp_path):
+    write(tmp_path, attributes, experiment)
     assert not said(tmp_path, step=step, own=own)
 
 
@@ -94,32 +99,20 @@ def test_what_the_warning_proposes_gives_the_declared_step(step, own, tmp_path):
     assert not said(tmp_path, *proposed[1::2], step=step, own=own)
 
 
-def test_a_step_that_is_rounded_in_the_description_is_the_same(tmp_path):
-    fmi2(tmp_path, experiment='stepSize="0.0333333333"')
-    assert not said(tmp_path, step="1/30")
-    fmi2(tmp_path, experiment='stepSize="0.0123457"')
-    assert said(tmp_path)
-
-
-@pytest.mark.parametrize("step", ["0.01", "0.02", "0.1"])
-def test_multiples_of_an_internal_step_are_no_warning(step, tmp_path):
-    fmi3(tmp_path, 'fixedInternalStepSize="1e-2"')
-    assert not said(tmp_path, step=step)
-
-
-@pytest.mark.parametrize("step", ["0.001", "0.015", "0.005"])
-@pytest.mark.parametrize("handles", ["true", "false"])
-def test_other_steps_than_multiples_of_an_internal_step_are(step, handles, tmp_path):
-    fmi3(tmp_path, f'fixedInternalStepSize="0.01" canHandleVariableCommunicationStepSize="{handles}"')
+@pytest.mark.parametrize(
+    ("write", "attributes", "experiment", "step", "named"),
+    [
+        (fmi2, "", 'stepSize="0.0123457"', "0.001", "0.0123457 s"),
+        (fmi3, "", 'stepSize="0.01"', "0.001", "0.01 s"),
+        (fmi3, 'fixedInternalStepSize="0.01"', "", "0.015", "0.01 s"),
+        (fmi3, f'fixedInternalStepSize="0.01" {PARTICULAR}', "", "0.005", "0.01 s"),
+    ],
+)
+def test_another_step_is_a_warning_too(write, attributes, experiment, step, named, tmp_path):
+    write(tmp_path, attributes, experiment)
     (warning,) = said(tmp_path, step=step)
-    assert "0.01 s" in warning.message
+    assert named in warning.message
     assert f"{step} s" in warning.message
-
-
-def test_a_preferred_step_of_fmi_3_is_declared_as_in_fmi_2(tmp_path):
-    fmi3(tmp_path, experiment='stepSize="0.01"')
-    assert said(tmp_path)
-    assert not said(tmp_path, step="0.01")
 
 
 SOURCE = """
