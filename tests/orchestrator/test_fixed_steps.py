@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shlex
-import sys
 import zipfile
 from pathlib import Path
 
@@ -12,11 +11,10 @@ import pytest
 from tests.cars import load_scenario, make_plan
 from tests.changed import changed
 from tests.command_line import status_of
-from tests.conftest import compiled
 from tests.fmus.fake_fmus import make_fmu, model_description
+from tests.refusals import mentions
 from yawbench.fmus.description import binary_of
 from yawbench.foundation.errors import Diagnostic
-from yawbench.orchestrator.results.reader import load_results
 
 pytestmark = pytest.mark.usefixtures("common_cache")
 
@@ -113,40 +111,8 @@ def test_another_step_is_a_warning_too(write, attributes, experiment, step, name
     assert f"{step} s" in warning.message
 
 
-SOURCE = """
-#include <stdlib.h>
-void* fmi2Instantiate(const char*n,int k,const char*g,const char*r,const void*c,int v,int l) {
-  return calloc(1,8);
-}
-void fmi2FreeInstance(double*m){ free(m); }
-int fmi2SetupExperiment(double*m,int a,double b,double c,int d,double e){ return 0; }
-int fmi2EnterInitializationMode(double*m){ return 0; }
-int fmi2ExitInitializationMode(double*m){ return 0; }
-int fmi2Terminate(double*m){ return 0; }
-int fmi2SetReal(double*m,const unsigned*r,size_t n,const double*v){ return 0; }
-int fmi2GetReal(double*m,const unsigned*r,size_t n,double*v){ for(size_t i=0;i<n;i++) v[i]=*m; return 0; }
-int fmi2DoStep(double*m,double t,double h,int x){ *m+=0.01*(int)(h/0.01+1e-9); return 0; }
-"""
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="compiles for Linux")
-def test_check_and_run_warn_and_the_proposal_gives_the_right_numbers(tmp_path, capsys):
-    (tmp_path / "g.c").write_text(SOURCE)
+def test_check_says_what_to_set(tmp_path, capsys):
     fmi2(tmp_path)
-    with zipfile.ZipFile(tmp_path / "g.fmu") as archive:
-        xml = archive.read("modelDescription.xml")
-    with zipfile.ZipFile(tmp_path / "g.fmu", "w") as archive:
-        archive.writestr("modelDescription.xml", xml)
-        archive.write(compiled(tmp_path / "g.c", tmp_path / "g.so"), binary_of(2, "g"))
-    (tmp_path / "s.yaml").write_text("stop_time: 0.1\nstep_size: 0.001\nunits: {one: {fmu: ./g.fmu}}\n")
-
-    def command(*arguments: str) -> str:
-        assert status_of(arguments[0], tmp_path / "s.yaml", *arguments[1:]) == 0
-        return "".join(capsys.readouterr())
-
-    assert "one.step_size=0.01" in command("check")
-    out = tmp_path / "out"
-    assert "one.step_size=0.01" in command("run", "--out", str(out))
-    assert load_results(out)["one.y"][-1] == 0.0
-    assert "declares" not in command("run", "--out", str(out), "--set", "one.step_size=0.01")
-    assert load_results(out)["one.y"][-1] == pytest.approx(0.1)
+    assert said(tmp_path)
+    assert status_of("check", tmp_path / "s.yaml") == 0
+    assert mentions(capsys.readouterr().err, "note", "0.001 s", "one.step_size=0.01")
