@@ -20,7 +20,6 @@ from tests.command_line import status_of
 from tests.commands.test_run import FAULTY, PAIR
 from tests.fmus import models3
 from tests.fmus.models3 import make_fmu
-from tests.orchestrator.test_foreign import write_fmu
 from tests.refusals import mentions, refused
 from yawbench.fmus.build import build_component
 from yawbench.fmus.compiler import load_compiled
@@ -175,30 +174,6 @@ def test_instances_of_fmi_3_give_the_same_bytes(both, models, tmp_path):
     assert record["smallest"]["Every.Float32_out"] < 0.0
 
 
-FOREIGN = """
-stop_time: 0.5
-step_size: 0.05
-inputs: {{a.Real_in: 0.75}}
-units:
-  a: {{fmu: ./foreign.fmu}}
-  b: {{fmu: ./foreign.fmu, parameters: {{answer: {answer}}}}}
-connections:
-  - {{from: a.Real_out, to: b.Real_in}}
-"""
-
-
-@pytest.fixture
-def two(library, tmp_path):
-    """Write a scenario of two units, of which the second answers a step as it is told; return its path."""
-
-    def write(answer, guid="{good}"):
-        write_fmu(tmp_path / "foreign.fmu", library, "Real", guid=guid)
-        (tmp_path / "two.yaml").write_text(FOREIGN.format(answer=answer))
-        return tmp_path / "two.yaml"
-
-    return write
-
-
 @pytest.mark.parametrize(
     ("answer", "guid", "status", "names"),
     [
@@ -208,15 +183,15 @@ def two(library, tmp_path):
         (0, "{half}", 0, ("0.275 s", "ended")),
     ],
 )
-def test_a_status_ends_the_run_with_the_same_sentence(both, two, answer, guid, status, names):
-    given, said, _ = both(two(answer, guid))
+def test_a_status_ends_the_run_with_the_same_sentence(both, scenario, answer, guid, status, names):
+    given, said, _ = both(scenario(answer=answer, guid=guid))
     assert given == status
     assert mentions(said, *names)
 
 
-def test_isolated_instances_are_left_to_the_loop_in_python(both, two):
+def test_isolated_instances_are_left_to_the_loop_in_python(both, scenario):
     why = "Python: no instance is stepped in this process by a C function"
-    assert both(two(3), "--isolate", loop=why)[0] == 1
+    assert both(scenario(answer=3), "--isolate", loop=why)[0] == 1
 
 
 @pytest.mark.sampled(2)

@@ -22,11 +22,12 @@ each_algorithm = pytest.mark.parametrize("algorithm", ["jacobi", "gauss_seidel",
 
 @pytest.fixture
 def go(models, tmp_path, capsys, isolate):
-    """Call a command for units as name -> (model or path, other keys); return status, words, results."""
+    """Call a command for units as name -> model or path (and other keys); return status, words, results."""
 
     def call(units, *arguments, command="run", stop_time=1.0, step_size=0.1, **keys):
         given = {}
-        for name, (fmu, more) in units.items():
+        for name, unit in units.items():
+            fmu, more = unit if isinstance(unit, tuple) else (unit, {})
             path = fmu if isinstance(fmu, Path) else make_fmu(tmp_path, fmu, models)
             given[name] = {"fmu": str(path), **more}
         data = {"stop_time": stop_time, "step_size": step_size, "units": given, **keys}
@@ -117,7 +118,7 @@ def test_every_type_passes_from_unit_to_unit(run):
     constants = {f"a.{kind}_in": value for kind, value in EVERY.items()}
     constants |= {"a.String_in": "größer", "a.mode_in": "wet"}
     wires = [{"from": f"a.{kind}_out", "to": f"b.{kind}_in"} for kind in (*EVERY, "String", "mode")]
-    results = run({"a": ("Every", {}), "b": ("Every", {})}, inputs=constants, connections=wires)
+    results = run({"a": "Every", "b": "Every"}, inputs=constants, connections=wires)
     for unit in "ab":
         last = {kind: results[f"{unit}.{kind}_out"][-1] for kind in EVERY}
         assert last == {**EVERY, "Float32": float(np.float32(0.1))}
@@ -133,7 +134,7 @@ def test_every_type_passes_from_unit_to_unit(run):
     ],
 )
 def test_a_constant_that_a_type_cannot_hold_is_refused(fails, kind, value, names):
-    fails(2, names, {"a": ("Every", {})}, inputs=rest(units="a") | {f"a.{kind}_in": value})
+    fails(2, names, {"a": "Every"}, inputs=rest(units="a") | {f"a.{kind}_in": value})
 
 
 @together_and_apart
@@ -148,7 +149,7 @@ def test_types_convert_on_a_wire_without_loss(run, library, tmp_path):
     constants = rest(*(wire["to"] for wire in wires), units="ab")
     constants |= {"a.Int64_in": 2**53 - 1, "a.Int8_in": 4, "a.mode_in": "wet"}
     old = write_fmu(tmp_path / "foreign.fmu", library, "Real")
-    units = {"a": ("Every", {}), "b": ("Every", {}), "old": (old, {})}
+    units = {"a": "Every", "b": "Every", "old": old}
     results = run(units, inputs=constants, connections=wires)
     taken = {name: set(results[f"b.{name}_out"]) for name in ("Float64", "Float32", "mode", "UInt8")}
     assert taken == {"Float64": {2.0**53 - 1}, "Float32": {-2.75}, "mode": {4}, "UInt8": {4}}
@@ -157,7 +158,7 @@ def test_types_convert_on_a_wire_without_loss(run, library, tmp_path):
 
 @each_algorithm
 def test_an_integer_that_feeds_a_real_is_coupled_alike_by_both_loops(by_both_loops, algorithm):
-    units = {"m": ("Matrix", {}), "a": ("Stair", {}), "n": ("Matrix", {"step_size": 0.4})}
+    units = {"m": "Matrix", "a": "Stair", "n": ("Matrix", {"step_size": 0.4})}
     wires = [
         {"from": "a.counter", "to": "m.u[1]", "gain": 0.5, "offset": 1},
         {"from": "m.y[1]", "to": "n.u[1]"},
@@ -187,7 +188,7 @@ def test_a_number_that_its_input_cannot_be_ends_the_run(
     fails, tmp_path, library, wire, constants, unit, time, names
 ):
     old = write_fmu(tmp_path / "foreign.fmu", library, "Integer")
-    units = {"a": ("Stair", {}), "b": ("Every", {}), "c": ("Every", {}), "old": (old, {})}
+    units = {"a": "Stair", "b": "Every", "c": "Every", "old": old}
     source, target = wire.split(" -> ")
     inputs = {"old.Integer_in": 0} | rest(units="bc") | constants
     del inputs[target]
@@ -202,7 +203,7 @@ def test_a_number_that_its_input_cannot_be_ends_the_run(
 @pytest.mark.sampled(2)
 def test_arrays_are_wired_set_and_recorded_element_by_element(run, library, tmp_path, algorithm):
     matrix = {"A[1,1]": 1.0, "A[1,2]": 2.0, "A[2,1]": 3.0}  # A[2,2] keeps its start value, 1
-    units = {"d": ("Dahlquist", {}), "m": ("Matrix", {"parameters": matrix}), "n": ("Matrix", {})}
+    units = {"d": "Dahlquist", "m": ("Matrix", {"parameters": matrix}), "n": "Matrix"}
     wires = [{"from": "d.x", "to": "m.u[2]"}, {"from": "m.y[*]", "to": "n.u[*]"}]
     results = run(units, inputs={"m.u[1]": 10.0}, connections=wires, algorithm=algorithm)
     x = np.array([0.99 ** (10 * k) for k in range(11)])
@@ -229,14 +230,14 @@ def test_whole_arrays_are_given_and_connected(run):
 
 def test_options_give_whole_arrays(fails, run):
     options = ("--set", "m.A=[[1, 2], [3, 4]]", "--set", "inputs.m.u=[7, 8]")
-    results = run({"m": ("Matrix", {})}, *options, inputs={"m.u": [0, 0]})
+    results = run({"m": "Matrix"}, *options, inputs={"m.u": [0, 0]})
     assert [results[f"m.y[{i}]"][-1] for i in (1, 2)] == [7 + 16, 21 + 32]
     wrong = ("--set", "m.A=[1, nan, 3, 4]")
-    fails(2, "--set m.A | 2x2 | 4", {"m": ("Matrix", {})}, *wrong, inputs={"m.u": [0, 0]})
+    fails(2, "--set m.A | 2x2 | 4", {"m": "Matrix"}, *wrong, inputs={"m.u": [0, 0]})
 
 
 def test_an_element_takes_precedence_over_its_array(run):
-    results = run({"m": ("Matrix", {})}, inputs={"m.u[2]": 3.0, "m.u": [7, 8]})
+    results = run({"m": "Matrix"}, inputs={"m.u[2]": 3.0, "m.u": [7, 8]})
     assert [results[f"m.y[{i}]"][-1] for i in (1, 2)] == [7, 3]
 
 
@@ -255,10 +256,7 @@ def test_an_element_takes_precedence_over_its_array(run):
     ],
 )
 def test_an_array_takes_as_many_values_as_it_has_elements(fails, parameters, inputs, wires, names):
-    units = {
-        "m": ("Matrix", {"parameters": parameters}), "n": ("Matrix", {}),
-        "s": ("Sized", {}), "d": ("Dahlquist", {}),
-    }  # fmt: skip
+    units = {"m": ("Matrix", {"parameters": parameters}), "n": "Matrix", "s": "Sized", "d": "Dahlquist"}
     others = {"s.v": [1, 2, 3]} if wires else {"n.u": [1, 2], "s.v": [1, 2, 3]}
     given = {f"m.{name}": value for name, value in inputs.items()} | others
     fails(2, names, units, inputs=given, connections=wires)
@@ -296,7 +294,7 @@ def test_a_size_that_an_fmu_refuses_ends_the_run(fails):
 @pytest.mark.sampled(2)
 def test_tunable_parameters_follow_wires_and_series(run, tmp_path, algorithm):
     (tmp_path / "k.csv").write_text("time,k\n0,1\n0.5,3\n1,5\n", encoding="utf-8")
-    units = {"d": ("Dahlquist", {}), "s": ("Sized", {}), "t": ("Sized", {})}
+    units = {"d": "Dahlquist", "s": "Sized", "t": "Sized"}
     inputs = {"s.v": [1, 1, 1], "t.v": [1, 2, 3], "t.k": {"file": "k.csv", "interpolation": "held"}}
     wires = [{"from": "d.x", "to": "s.k"}]
     results = run(units, inputs=inputs, connections=wires, algorithm=algorithm)
@@ -308,12 +306,12 @@ def test_tunable_parameters_follow_wires_and_series(run, tmp_path, algorithm):
 
 
 def test_a_parameter_that_is_not_tunable_follows_nothing(fails):
-    units = {"d": ("Dahlquist", {}), "e": ("Dahlquist", {})}
+    units = {"d": "Dahlquist", "e": "Dahlquist"}
     fails(2, "e.k | parameter | fixed", units, connections=[{"from": "d.x", "to": "e.k"}])
 
 
 def test_variables_that_cannot_be_used_are_named(go):
-    status, said, _ = go({"a": ("Every", {})}, command="check", inputs=rest(units="a"))
+    status, said, _ = go({"a": "Every"}, command="check", inputs=rest(units="a"))
     assert status == 0, said
     for name, kind in (("raw", "Binary"), ("tick", "Clock"), ("ticked", "Clock")):
         assert mentions(said, "a (Every)", name, kind)
@@ -321,7 +319,7 @@ def test_variables_that_cannot_be_used_are_named(go):
 
 @mostly_together
 def test_an_alias_of_an_input_is_another_name_for_it(run):
-    units = {"d": ("Dahlquist", {}), "m": ("Matrix", {}), "n": ("Matrix", {})}
+    units = {"d": "Dahlquist", "m": "Matrix", "n": "Matrix"}
     wires = [{"from": "d.x", "to": "m.force[2]"}, {"from": "m.y[*]", "to": "n.force[*]"}]
     record = ["d.x", "m.force[*]", "m.u[*]", "n.force[1]", "n.y[*]"]
     faults = ["--fault", "n.force[1]: gain 3"]
@@ -335,12 +333,12 @@ def test_an_alias_of_an_input_is_another_name_for_it(run):
 
 def test_an_output_feeds_the_input_that_has_its_name_as_an_alias(run):
     inputs = rest("e.Float64_in", units="e")
-    results = run({"s": ("Dahlquist", {}), "e": ("Every", {})}, inputs=inputs)
+    results = run({"s": "Dahlquist", "e": "Every"}, inputs=inputs)
     assert results["e.Float64_out"].tolist() == results["s.x"].tolist()
 
 
 def test_an_input_with_two_names_has_one_source(fails):
-    units = {"s": ("Dahlquist", {}), "m": ("Matrix", {})}
+    units = {"s": "Dahlquist", "m": "Matrix"}
     wires = [{"from": "s.x", "to": "m.u[1]"}, {"from": "s.x", "to": "m.force[1]"}]
     names = "s.yaml:1 | connections[1] | m.u[1] | s.x | connections[0]"
     fails(2, names, units, inputs={"m.u[2]": 0.0}, connections=wires)
@@ -349,7 +347,7 @@ def test_an_input_with_two_names_has_one_source(fails):
 @mostly_together
 def test_units_of_both_versions_share_a_scenario(run, tmp_path, library):
     old = write_fmu(tmp_path / "foreign.fmu", library, "Real")
-    units = {"d": ("Dahlquist", {}), "old": (old, {}), "m": ("Matrix", {})}
+    units = {"d": "Dahlquist", "old": old, "m": "Matrix"}
     wires = [{"from": "d.x", "to": "old.Real_in"}, {"from": "old.Real_out", "to": "m.u[1]"}]
     results = run(units, inputs={"m.u[2]": 1.0}, connections=wires)
     assert results["m.y[1]"].tolist() == (2 * results["d.x"]).tolist()
@@ -358,7 +356,7 @@ def test_units_of_both_versions_share_a_scenario(run, tmp_path, library):
 
 @mostly_together
 def test_an_fmu_that_wants_to_end_ends_the_run_after_its_last_step(run):
-    results = run({"a": ("Stair", {})}, stop_time=20, step_size=0.5)
+    results = run({"a": "Stair"}, stop_time=20, step_size=0.5)
     assert mentions(results.record.ended.message, "9 s", "ended")
     assert (results.time[-1], results["a.counter"][-1]) == (9.0, 10)
     assert results.record.ended.time == 9.0
@@ -366,13 +364,13 @@ def test_an_fmu_that_wants_to_end_ends_the_run_after_its_last_step(run):
 
 @mostly_together
 def test_a_step_from_which_an_fmu_returns_early_is_gone_to_its_end(run):
-    results = run({"a": ("Early", {})})
+    results = run({"a": "Early"})
     assert np.allclose(results["a.gone"], results.time, atol=1e-12)
 
 
 @mostly_together
 def test_an_fmu_that_returns_early_and_stays_is_an_error(fails):
-    fails(1, "a: | 0 s", {"a": ("Stuck", {})})
+    fails(1, "a: | 0 s", {"a": "Stuck"})
 
 
 @mostly_together
@@ -382,24 +380,24 @@ def test_a_parameter_that_does_not_take_ends_the_run(fails):
 
 @together_and_apart
 def test_an_fmu_that_refuses_to_be_instantiated_says_why(fails):
-    fails(1, "a: | Refusing.fmu | 100", {"a": ("Refusing", {})})
+    fails(1, "a: | Refusing.fmu | 100", {"a": "Refusing"})
 
 
 @pytest.mark.parametrize(("target", "kind"), [("b.raw", "Binary"), ("b.tick", "Clock")])
 def test_what_is_not_supported_is_refused_where_it_is_asked_for(fails, target, kind):
-    units, wires = {"a": ("Every", {}), "b": ("Every", {})}, [{"from": "a.Int8_out", "to": target}]
+    units, wires = {"a": "Every", "b": "Every"}, [{"from": "a.Int8_out", "to": target}]
     fails(2, f"{target} | {kind}", units, inputs=rest(units="ab"), connections=wires)
 
 
 @pytest.mark.parametrize("interface", ["ModelExchange", "ScheduledExecution"])
 def test_other_interfaces_are_refused(fails, tmp_path, models, interface):
     path = make_fmu(tmp_path, "Dahlquist", models, interface=interface)
-    fails(2, "FMI | 2.0 | 3.0", {"a": (path, {})})
+    fails(2, "FMI | 2.0 | 3.0", {"a": path})
 
 
 @mostly_together
 def test_elements_of_arrays_can_be_faulty(run):
-    units = {"d": ("Dahlquist", {}), "m": ("Matrix", {}), "n": ("Matrix", {})}
+    units = {"d": "Dahlquist", "m": "Matrix", "n": "Matrix"}
     wires = [{"from": "d.x", "to": "m.u[2]"}, {"from": "m.y[*]", "to": "n.u[*]"}]
     faults = ["--fault", "d.x -> m: bias 1 from 0.5 s", "--fault", "m.y[1]: gain 3"]
     results = run(units, *faults, inputs={"m.u[1]": 10.0}, connections=wires)
@@ -411,7 +409,7 @@ def test_elements_of_arrays_can_be_faulty(run):
 
 
 def test_check_shows_arrays_and_their_constants(go):
-    status, said, _ = go({"m": ("Matrix", {})}, command="check", inputs={"m.u[*]": 2.5})
+    status, said, _ = go({"m": "Matrix"}, command="check", inputs={"m.u[*]": 2.5})
     assert status == 0, said
     shown = [line.split() for line in said.splitlines()]
     assert ["u[1]", "2.5", "scenario", "m"] in shown
@@ -420,7 +418,7 @@ def test_check_shows_arrays_and_their_constants(go):
 
 
 LOOP = [{"from": "m.y[1]", "to": "n.u[1]"}, {"from": "n.y[1]", "to": "m.u[1]", "gain": 0.5}]
-FEEDBACK = {"m": ("Matrix", {"parameters": {"A[1,2]": 1.0}}), "n": ("Matrix", {})}
+FEEDBACK = {"m": ("Matrix", {"parameters": {"A[1,2]": 1.0}}), "n": "Matrix"}
 
 
 def delayed(wire):
@@ -465,7 +463,7 @@ def test_a_delayed_wire_brings_the_value_of_one_communication_step_before(run, a
     ],
 )
 def test_a_delay_that_cannot_be_is_refused(fails, tmp_path, source, target, delay, command, names):
-    units = {"d": ("Dahlquist", {}), "m": ("Matrix", {}), "e": ("Every", {}), "f": ("Every", {})}
+    units = {"d": "Dahlquist", "m": "Matrix", "e": "Every", "f": "Every"}
     inputs = rest("f.Int8_in" if "f" in target else "", "e.Float64_in", "f.Float64_in", units="ef")
     inputs |= {name: 0.0 for name in ("m.u[1]", "m.u[2]") if name != target}
     wires = [{"from": source, "to": target, "delay": delay}]
