@@ -12,7 +12,7 @@ import pytest
 
 from tests.command_line import status_of
 from tests.fmus.models3 import make_fmu
-from tests.orchestrator.test_foreign import mostly_together, together_and_apart, write_fmu
+from tests.orchestrator.foreign_fmus import mostly_together, together_and_apart, write_fmu
 from tests.refusals import mentions
 from yawbench.orchestrator.results.reader import load_results
 

@@ -8,7 +8,7 @@ import zipfile
 import pytest
 
 from tests.command_line import status_of
-from tests.orchestrator.test_foreign import mostly_together, write_fmu
+from tests.orchestrator.foreign_fmus import mostly_together, write_fmu
 from tests.refusals import each_mentions, mentions
 from yawbench.orchestrator.results.reader import load_results
 

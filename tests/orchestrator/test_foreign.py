@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ctypes
 import sys
-import zipfile
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,6 +12,8 @@ import pytest
 
 from tests.cars import load_scenario, make_plan
 from tests.command_line import status_of
+from tests.orchestrator.foreign_fmus import KINDS, mostly_together, together_and_apart
+from tests.orchestrator.foreign_fmus import write_fmu as write_fmu
 from tests.refusals import each_mentions, mentions, refused
 from yawbench.foundation.errors import ModelDescriptionError, SimulationError, YawbenchError
 from yawbench.metrics.expressions import evaluate, metric
@@ -23,96 +24,9 @@ from yawbench.orchestrator.master.simulate import simulate
 from yawbench.orchestrator.results.freshness import staleness
 from yawbench.orchestrator.results.reader import load_results
 
-INPUT, OUTPUT, ANSWER = 1000001, 4000000000, 7
 DISCARD, ERROR, FATAL, AT_THE_END = 2, 3, 4, 100
 """What the parameter `answer` asks a step for; with 100 more the end of the instance."""
-STARTS = {"Real": "0", "Integer": "0", "Boolean": "false", "String": "", "Enumeration": "1"}
-MODES = """
-<TypeDefinitions><SimpleType name="Mode"><Enumeration>
-  <Item name="dry" value="1"/><Item name="wet" value="2"/><Item name="ice" value="4"/>
-</Enumeration></SimpleType></TypeDefinitions>"""
-
-SCENARIO = """
-title: Two strangers
-stop_time: 0.5
-step_size: 0.05
-inputs: {constants}
-units:
-  a: {{fmu: ./foreign.fmu}}
-  b: {{fmu: ./foreign.fmu, parameters: {{answer: {answer}}}{more}}}
-{record}
-connections:
-{connections}
-"""
-KINDS = {"Real": 0.75, "Integer": -21, "Boolean": "true", "String": "größer"}
-
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="compiles for Linux")
-
-
-def description(*kinds, guid, more=""):
-    """Return a model description without optional capabilities, with large and sparse references."""
-    variables = [
-        f'<ScalarVariable name="answer" valueReference="{ANSWER}" causality="parameter"'
-        ' variability="tunable"><Integer start="0" min="0" max="4"/></ScalarVariable>'
-    ]
-    for kind in kinds:
-        change = "" if kind == "Real" else ' variability="discrete"'
-        mode = ' declaredType="Mode"' if kind == "Enumeration" else ""
-        variables += [
-            f'<ScalarVariable name="{kind}_in" valueReference="{INPUT}" causality="input"{change}>'
-            f'<{kind}{mode} start="{STARTS[kind]}"/></ScalarVariable>',
-            f'<ScalarVariable name="{kind}_out" valueReference="{OUTPUT}" causality="output"{change}>'
-            f"<{kind}{mode}/></ScalarVariable>",
-        ]
-    outputs = "".join(f'<Unknown index="{3 + 2 * i}" dependencies="{2 + 2 * i}"/>' for i in range(len(kinds)))
-    return (
-        '<?xml version="1.0" encoding="UTF-8"?>\n'
-        f'<fmiModelDescription fmiVersion="2.0" modelName="foreign" guid="{guid}">'
-        f'<CoSimulation modelIdentifier="foreign"/>{more}{MODES if "Enumeration" in kinds else ""}'
-        f"<ModelVariables>{''.join(variables)}</ModelVariables>"
-        f"<ModelStructure><Outputs>{outputs}</Outputs><InitialUnknowns>{outputs}</InitialUnknowns>"
-        "</ModelStructure></fmiModelDescription>"
-    )
-
-
-def write_fmu(path, binary, *kinds, guid="{good}", change=lambda xml: xml):
-    """Write an FMU with an input and an output of each kind; return its path."""
-    with zipfile.ZipFile(path, "w") as archive:
-        archive.writestr("modelDescription.xml", change(description(*kinds, guid=guid)))
-        archive.write(binary, f"binaries/{fmpy.platform}/foreign.so")
-    return path
-
-
-together_and_apart = pytest.mark.parametrize("isolate", [[], ["--isolate"]], ids=["together", "apart"])
-mostly_together = pytest.mark.parametrize(
-    "isolate", [[], pytest.param(["--isolate"], marks=pytest.mark.exhaustive)], ids=["together", "apart"]
-)
-
-
-together_and_apart = pytest.mark.parametrize("isolate", [[], ["--isolate"]], ids=["together", "apart"])
-mostly_together = pytest.mark.parametrize(
-    "isolate", [[], pytest.param(["--isolate"], marks=pytest.mark.exhaustive)], ids=["together", "apart"]
-)
-
-
-@pytest.fixture
-def scenario(library, tmp_path):
-    """Write a scenario of two units of an FMU, the second fed by the first; return its path."""
-
-    def write(
-        *, answer=0, given=KINDS, guid="{good}", scale="", record="", binary=library, change=lambda xml: xml,
-        more="",
-    ):  # fmt: skip
-        write_fmu(tmp_path / "foreign.fmu", binary, *given, guid=guid, change=change)
-        scale = f", {scale}" if scale else ""
-        wires = [f"  - {{from: a.{kind}_out, to: b.{kind}_in{scale}}}" for kind in given]
-        constants = ", ".join(f"a.{kind}_in: {value}" for kind, value in given.items())
-        parts = {"constants": f"{{{constants}}}", "connections": "\n".join(wires)}
-        text = SCENARIO.format(**parts, answer=answer, more=more, record=record)
-        (tmp_path / "two.yaml").write_text(text, encoding="utf-8")
-        return tmp_path / "two.yaml"
-
-    return write
 
 
 @pytest.fixture
