@@ -125,15 +125,14 @@ def test_an_fmu_that_refuses_to_be_instantiated_says_why(plan, tmp_path):
     assert [*counters] == [1, 0, 1]
 
 
-def _for_another_platform(library):
-    library.parent.rename(library.parent.with_name("win16"))
-
-
-def _no_library(library):
-    library.write_bytes(b"no library")
-
-
-@pytest.mark.parametrize("change", [_for_another_platform, _no_library])
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda library: library.parent.rename(library.parent.with_name("win16")),
+        lambda library: library.write_bytes(b"no library"),
+    ],
+    ids=["for another platform", "no library"],
+)
 def test_a_library_that_cannot_be_loaded_is_refused(scenario, cache, change, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     made = make_plan(load_scenario(scenario()))
