@@ -68,8 +68,16 @@ class _Clock(ctypes.Structure):
     _fields_ = [("period", ctypes.c_int64), ("time", ctypes.c_void_p)]
 
 
-class _Run(ctypes.Structure):
-    """`struct run` of `step_loop.c`."""
+class WalkState(ctypes.Structure):
+    """`struct run` of `step_loop.c`: where a walk is, and what it is for."""
+
+    k: int
+    """The communication point being stepped to."""
+    at: int
+    """Index of the current operation in the program of the step to `k`; negative between two steps: -2 if
+    only recording the step is left."""
+    status: int
+    """Status that the current operation has returned."""
 
     _fields_ = [
         *((name, ctypes.c_int64) for name in ("k", "at", "end", "first")),
@@ -130,7 +138,7 @@ class CompiledLoop:
         moving = (_Clock * len(clocks))()
         for i, (period, time) in enumerate(clocks.items()):
             moving[i] = _Clock(period, _address_of(time))
-        self._run = _Run(
+        self.state = WalkState(
             at=-1,
             clocks=_address_of(moving),
             n_clocks=len(clocks),
@@ -145,33 +153,15 @@ class CompiledLoop:
             stop=_address_of(stop),
             pause=PAUSE,
         )
-        self._reference = ctypes.byref(self._run)
+        self._reference = ctypes.byref(self.state)
         self._kept: list[Any] = [pool, clocks, moving, recorded, position, stop]
         self._programs: dict[int, tuple[Sequence[Any], Any]] = {}  # phase -> operations, and as plain data
         self._call_of = call_of
 
-    @property
-    def k(self) -> int:
-        """The communication point being stepped to."""
-        k: int = self._run.k
-        return k
-
-    @property
-    def at(self) -> int:
-        """Index of the current operation in the program of the step to `k`; negative between two steps."""
-        at: int = self._run.at
-        return at
-
-    @property
-    def status(self) -> int:
-        """Status that the current operation has returned."""
-        status: int = self._run.status
-        return status
-
     def expect(self, outputs: np.ndarray) -> None:
         """Have the outputs with these indices checked to be finite."""
         self._expected = outputs.astype(np.int64)
-        self._run.expected, self._run.n_expected = _address_of(self._expected), len(outputs)
+        self.state.expected, self.state.n_expected = _address_of(self._expected), len(outputs)
 
     def lay(
         self, points: range, rows: Sequence[np.ndarray], cycle: int, programs: Mapping[int, Sequence[Any]]
@@ -192,7 +182,7 @@ class CompiledLoop:
         addresses = [self._address(k % cycle, programs[k % cycle]) for k in points[:cycle]]
         self._table = (ctypes.c_void_p * len(addresses))(*addresses)
         self._rows = rows
-        run, n = self._run, len(points)
+        run, n = self.state, len(points)
         ends = [_address_of(row) for row in (*rows[: min(n, 2)], *rows[n - 1 : n])]
         first, second, last = ends[0], ends[-2], ends[-1]
         if len(rows) < n or last - first != (second - first) * (n - 1):
@@ -214,16 +204,8 @@ class CompiledLoop:
 
     def walk(self, end: int) -> Answer:
         """Step to a communication point, or until Python is needed."""
-        self._run.end = end
+        self.state.end = end
         return _ANSWERS[self._walk(self._reference)]
-
-    def pass_operation(self) -> None:
-        """Go on behind the current operation: Python has seen to it."""
-        self._run.at += 1
-
-    def pass_check(self) -> None:
-        """Go on with recording the step: Python has checked its outputs."""
-        self._run.at = -2
 
 
 def missing_loop(grid: tuple[int, int, int], n_steps: int) -> str:

@@ -227,10 +227,10 @@ class Master:
 
     def _walk(self, loop: CompiledLoop, end: int, others: list[list[Value]]) -> None:
         """Step to `end` by the compiled loop, with the calls that only Python can make."""
-        cycle = self.program.cycle
+        cycle, state = self.program.cycle, loop.state
         while self.completed < end:
             answer = loop.walk(self.completed + 1 if self._recorded_others else end)
-            self.completed, k = self._position.completed, loop.k
+            self.completed, k = self._position.completed, state.k
             if answer == Answer.FINISHED:
                 if self._recorded_others:
                     others.append(self._values_of_others())
@@ -239,12 +239,12 @@ class Master:
             elif answer == Answer.NOT_FINITE:
                 self._check_finite(k)
                 loop.expect(self._expected)
-                loop.pass_check()
+                state.at = -2  # go on with recording the step
             elif answer in (Answer.PYTHON, Answer.STATUS):
-                operation = self._operations[k % cycle][loop.at]
+                operation = self._operations[k % cycle][state.at]
                 call = operation.call
                 if answer == Answer.STATUS:
-                    status: Status | None = cast(PlainCall, call).finish(loop.status)
+                    status: Status | None = cast(PlainCall, call).finish(state.status)
                 else:
                     self._position.call = self._call_of.get((operation.instance, operation.kind), -1)
                     status = call()
@@ -252,7 +252,7 @@ class Master:
                 if status:
                     self._answer(k, operation, status)
                     end = end if self._ending is None else k
-                loop.pass_operation()
+                state.at += 1
 
     def go_back(self, point: int) -> None:
         """Note that all values are those of an earlier communication point again."""

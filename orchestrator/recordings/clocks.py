@@ -50,7 +50,7 @@ def seconds_of(times: np.ndarray, unit: str | None, what: str) -> np.ndarray:
         except ValueError:
             return _of_text(times, what)
     numbers = times.astype(float)
-    _refuse_infinite(numbers, what)
+    refuse_infinite(numbers, what)
     if unit in UNIX:
         seconds: np.ndarray = numbers - numbers[_first(~np.isnan(numbers), what)]
         return seconds / 1000.0 if np.nanmax(np.abs(numbers)) > MILLISECONDS else seconds
@@ -77,7 +77,8 @@ def _first(there: np.ndarray, what: str) -> int:
     return int(rows[0])
 
 
-def _refuse_infinite(numbers: np.ndarray, what: str) -> None:
+def refuse_infinite(numbers: np.ndarray, what: str) -> None:
+    """Raise ValueError if a number of a column is infinite."""
     bad = np.flatnonzero(np.isinf(numbers))
     if bad.size:
         raise ValueError(f"{what}: value {bad[0] + 1} is not finite ({numbers[bad[0]]:g})")

@@ -26,6 +26,7 @@ from yawbench.foundation.safe_files import read_bytes, reading, reason
 from ..results.run_record import RUN_FILE, check_record
 from ..scenario.quantities import Unit, spellings
 from .can_logs import LOGS, database_beside, read_log
+from .clocks import refuse_infinite
 from .text_tables import MISSING, Mark, read_text_table, split_header
 from .units_of_loggers import factors, stated_unit
 
@@ -330,9 +331,7 @@ def _numbers(column: np.ndarray, what: str) -> np.ndarray:
                 numbers[row] = np.nan if str(cell).strip().lower() in MISSING else float(cell)
             except (TypeError, ValueError):  # noqa: PERF203 - the first ends the loop
                 raise ValueError(f"{what}: value {row + 1} is not a number ({cell!r})") from None
-    bad = np.flatnonzero(np.isinf(numbers))
-    if bad.size:
-        raise ValueError(f"{what}: value {bad[0] + 1} is not finite ({numbers[bad[0]]:g})")
+    refuse_infinite(numbers, what)
     if np.isnan(numbers).all():
         raise ValueError(f"{what} has no values")
     return numbers

@@ -15,16 +15,17 @@ from yawbench.foundation.messages import listed
 from ..scenario.quantities import Unit, conversion, parse_unit, spellings
 
 WORDS = {
-    "sec": "s", "secs": "s", "second": "s", "seconds": "s", "msec": "ms", "millisecond": "ms",
-    "milliseconds": "ms", "usec": "us", "microseconds": "us", "minute": "min", "minutes": "min",
-    "mins": "min", "hr": "h", "hrs": "h", "hour": "h", "hours": "h",
-    "meter": "m", "meters": "m", "metre": "m", "metres": "m", "kilometers": "km", "kilometres": "km",
-    "degree": "deg", "degrees": "deg", "radian": "rad", "radians": "rad", "newton": "N", "newtons": "N",
-    "mile": "mi", "miles": "mi", "foot": "ft", "feet": "ft", "inch": "in", "inches": "in",
-    "celsius": "degC", "degc": "degC", "percent": "%", "pct": "%",
-    "s": "s", "ms": "ms", "us": "us", "h": "h", "m": "m", "km": "km", "cm": "cm", "mm": "mm", "deg": "deg",
-    "rad": "rad", "rpm": "rpm", "hz": "Hz", "bar": "bar", "mbar": "mbar", "kpa": "kPa", "pa": "Pa",
-    "kg": "kg", "n": "N", "kn": "kn", "nm": "Nm", "g": "g", "v": "V", "a": "A",
+    word: symbol
+    for symbol, words in {
+        "s": "s sec secs second seconds", "ms": "ms msec millisecond milliseconds",
+        "us": "us usec microseconds", "min": "minute minutes mins", "h": "h hr hrs hour hours",
+        "m": "m meter meters metre metres", "km": "km kilometers kilometres", "cm": "cm", "mm": "mm",
+        "mi": "mile miles", "ft": "foot feet", "in": "inch inches", "deg": "deg degree degrees",
+        "rad": "rad radian radians", "rpm": "rpm", "Hz": "hz", "N": "n newton newtons", "Nm": "nm",
+        "kg": "kg", "g": "g", "kn": "kn", "bar": "bar", "mbar": "mbar", "kPa": "kpa", "Pa": "pa",
+        "V": "v", "A": "a", "degC": "celsius degc", "%": "percent pct",
+    }.items()
+    for word in words.split()
 }  # fmt: skip
 """Word in small letters -> symbol; read only where the text is not a unit as it stands."""
 WHOLE = {
@@ -40,21 +41,19 @@ def _times(number: str | Fraction, unit: str) -> Unit:
 
 
 GRAVITY = _times("9.80665", "m/s2")
-_POUND = Fraction("4.4482216152605")
+_FAHRENHEIT = replace(_times(Fraction(5, 9), "K"), offset=Fraction(45967, 180))
+_FOOT, _POUND = Fraction("0.3048"), Fraction("4.4482216152605")
 MORE = {
-    "mph": _times("0.44704", "m/s"), "mi/h": _times("0.44704", "m/s"), "ft/s": _times("0.3048", "m/s"),
-    "kn": _times(Fraction(1852, 3600), "m/s"), "kt": _times(Fraction(1852, 3600), "m/s"),
-    "kts": _times(Fraction(1852, 3600), "m/s"), "knot": _times(Fraction(1852, 3600), "m/s"),
-    "knots": _times(Fraction(1852, 3600), "m/s"),
-    "ft": _times("0.3048", "m"), "in": _times("0.0254", "m"), "mi": _times("1609.344", "m"),
-    "yd": _times("0.9144", "m"), "lb": _times("0.45359237", "kg"), "lbs": _times("0.45359237", "kg"),
-    "lbf": _times(_POUND, "N"), "psi": _times(_POUND / Fraction("0.00064516"), "Pa"),
-    "ftlb": _times(_POUND * Fraction("0.3048"), "N.m"), "lbft": _times(_POUND * Fraction("0.3048"), "N.m"),
-    "ftlbs": _times(_POUND * Fraction("0.3048"), "N.m"),
-    "f": replace(_times(Fraction(5, 9), "K"), offset=Fraction(45967, 180)),
-    "degf": replace(_times(Fraction(5, 9), "K"), offset=Fraction(45967, 180)),
-    "g": GRAVITY,
-}  # fmt: skip
+    name: _times(number, unit)
+    for names, number, unit in (
+        ("mph mi/h", "0.44704", "m/s"), ("ft/s", _FOOT, "m/s"),
+        ("kn kt kts knot knots", Fraction(1852, 3600), "m/s"),
+        ("ft", _FOOT, "m"), ("in", "0.0254", "m"), ("mi", "1609.344", "m"), ("yd", "0.9144", "m"),
+        ("lb lbs", "0.45359237", "kg"), ("lbf", _POUND, "N"), ("ftlb ftlbs lbft", _POUND * _FOOT, "N.m"),
+        ("psi", _POUND / Fraction("0.00064516"), "Pa"),
+    )
+    for name in names.split()
+} | {"f": _FAHRENHEIT, "degf": _FAHRENHEIT, "g": GRAVITY}  # fmt: skip
 """Units that scenario files do not have, and `G`."""
 OF_GRAVITY = {text: GRAVITY for text in ("g", "gs", "g's")} | {"mg": _times("0.00980665", "m/s2")}
 """Likewise where an acceleration is expected."""

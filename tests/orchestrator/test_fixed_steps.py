@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shlex
-import sys
 import zipfile
 from pathlib import Path
 
@@ -12,11 +11,10 @@ import pytest
 from tests.cars import load_scenario, make_plan
 from tests.changed import changed
 from tests.command_line import status_of
-from tests.conftest import compiled
 from tests.fmus.fake_fmus import make_fmu, model_description
+from tests.refusals import mentions
 from yawbench.fmus.description import binary_of
 from yawbench.foundation.errors import Diagnostic
-from yawbench.orchestrator.results.reader import load_results
 
 pytestmark = pytest.mark.usefixtures("common_cache")
 
@@ -55,30 +53,33 @@ def said(folder: Path, *settings: str, step: str = "0.001", own: str = "") -> li
     return [d for d in plan.diagnostics if d.code == "instance-step-differs"]
 
 
-@pytest.mark.parametrize("attributes", ["", 'canHandleVariableCommunicationStepSize="false"'])
+PARTICULAR = 'canHandleVariableCommunicationStepSize="false"'
+
+
+@pytest.mark.parametrize("attributes", ["", PARTICULAR])
 def test_another_step_than_an_fmu_declares_is_a_warning_with_both(attributes, tmp_path):
     fmi2(tmp_path, attributes)
     (warning,) = said(tmp_path)
-    assert warning.severity == "warning"
-    assert warning.location.signal == "one.step_size"
-    assert warning.value == 0.001
+    assert (warning.severity, warning.location.signal, warning.value) == ("warning", "one.step_size", 0.001)
     assert "0.001 s" in warning.message
     assert "0.01 s" in warning.message
 
 
-def test_an_fmu_that_takes_any_step_or_prefers_none_gets_any(tmp_path):
-    fmi2(tmp_path, 'canHandleVariableCommunicationStepSize="true"')
-    assert not said(tmp_path)
-    fmi2(tmp_path, experiment='stopTime="1"')
-    assert not said(tmp_path)
-
-
 @pytest.mark.parametrize(
-    ("step", "own"),
-    [("0.01", ""), ("0.001", "0.01"), ("0.005", "10 ms"), ("1/100", "")],
+    ("write", "attributes", "experiment", "step", "own"),
+    [
+        (fmi2, PARTICULAR.replace("false", "true"), 'stepSize="0.01"', "0.001", ""),
+        (fmi2, "", 'stopTime="1"', "0.001", ""),
+        (fmi2, "", 'stepSize="0.01"', "1/100", ""),
+        (fmi2, "", 'stepSize="0.01"', "0.005", "10 ms"),
+        (fmi2, "", 'stepSize="0.0333333333"', "1/30", ""),  # rounded in the description
+        (fmi3, "", 'stepSize="0.01"', "0.01", ""),
+        (fmi3, 'fixedInternalStepSize="1e-2"', "", "0.01", ""),
+        (fmi3, 'fixedInternalStepSize="1e-2"', "", "0.1", ""),
+    ],
 )
-def test_the_declared_step_is_no_warning(step, own, tmp_path):
-    fmi2(tmp_path)
+def test_a_step_that_an_fmu_takes_is_no_warning(write, attributes, experiment, step, own, tmp_path):
+    write(tmp_path, attributes, experiment)
     assert not said(tmp_path, step=step, own=own)
 
 
@@ -94,68 +95,24 @@ def test_what_the_warning_proposes_gives_the_declared_step(step, own, tmp_path):
     assert not said(tmp_path, *proposed[1::2], step=step, own=own)
 
 
-def test_a_step_that_is_rounded_in_the_description_is_the_same(tmp_path):
-    fmi2(tmp_path, experiment='stepSize="0.0333333333"')
-    assert not said(tmp_path, step="1/30")
-    fmi2(tmp_path, experiment='stepSize="0.0123457"')
-    assert said(tmp_path)
-
-
-@pytest.mark.parametrize("step", ["0.01", "0.02", "0.1"])
-def test_multiples_of_an_internal_step_are_no_warning(step, tmp_path):
-    fmi3(tmp_path, 'fixedInternalStepSize="1e-2"')
-    assert not said(tmp_path, step=step)
-
-
-@pytest.mark.parametrize("step", ["0.001", "0.015", "0.005"])
-@pytest.mark.parametrize("handles", ["true", "false"])
-def test_other_steps_than_multiples_of_an_internal_step_are(step, handles, tmp_path):
-    fmi3(tmp_path, f'fixedInternalStepSize="0.01" canHandleVariableCommunicationStepSize="{handles}"')
+@pytest.mark.parametrize(
+    ("write", "attributes", "experiment", "step", "named"),
+    [
+        (fmi2, "", 'stepSize="0.0123457"', "0.001", "0.0123457 s"),
+        (fmi3, "", 'stepSize="0.01"', "0.001", "0.01 s"),
+        (fmi3, 'fixedInternalStepSize="0.01"', "", "0.015", "0.01 s"),
+        (fmi3, f'fixedInternalStepSize="0.01" {PARTICULAR}', "", "0.005", "0.01 s"),
+    ],
+)
+def test_another_step_is_a_warning_too(write, attributes, experiment, step, named, tmp_path):
+    write(tmp_path, attributes, experiment)
     (warning,) = said(tmp_path, step=step)
-    assert "0.01 s" in warning.message
+    assert named in warning.message
     assert f"{step} s" in warning.message
 
 
-def test_a_preferred_step_of_fmi_3_is_declared_as_in_fmi_2(tmp_path):
-    fmi3(tmp_path, experiment='stepSize="0.01"')
-    assert said(tmp_path)
-    assert not said(tmp_path, step="0.01")
-
-
-SOURCE = """
-#include <stdlib.h>
-void* fmi2Instantiate(const char*n,int k,const char*g,const char*r,const void*c,int v,int l) {
-  return calloc(1,8);
-}
-void fmi2FreeInstance(double*m){ free(m); }
-int fmi2SetupExperiment(double*m,int a,double b,double c,int d,double e){ return 0; }
-int fmi2EnterInitializationMode(double*m){ return 0; }
-int fmi2ExitInitializationMode(double*m){ return 0; }
-int fmi2Terminate(double*m){ return 0; }
-int fmi2SetReal(double*m,const unsigned*r,size_t n,const double*v){ return 0; }
-int fmi2GetReal(double*m,const unsigned*r,size_t n,double*v){ for(size_t i=0;i<n;i++) v[i]=*m; return 0; }
-int fmi2DoStep(double*m,double t,double h,int x){ *m+=0.01*(int)(h/0.01+1e-9); return 0; }
-"""
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="compiles for Linux")
-def test_check_and_run_warn_and_the_proposal_gives_the_right_numbers(tmp_path, capsys):
-    (tmp_path / "g.c").write_text(SOURCE)
+def test_check_says_what_to_set(tmp_path, capsys):
     fmi2(tmp_path)
-    with zipfile.ZipFile(tmp_path / "g.fmu") as archive:
-        xml = archive.read("modelDescription.xml")
-    with zipfile.ZipFile(tmp_path / "g.fmu", "w") as archive:
-        archive.writestr("modelDescription.xml", xml)
-        archive.write(compiled(tmp_path / "g.c", tmp_path / "g.so"), binary_of(2, "g"))
-    (tmp_path / "s.yaml").write_text("stop_time: 0.1\nstep_size: 0.001\nunits: {one: {fmu: ./g.fmu}}\n")
-
-    def command(*arguments: str) -> str:
-        assert status_of(arguments[0], tmp_path / "s.yaml", *arguments[1:]) == 0
-        return "".join(capsys.readouterr())
-
-    assert "one.step_size=0.01" in command("check")
-    out = tmp_path / "out"
-    assert "one.step_size=0.01" in command("run", "--out", str(out))
-    assert load_results(out)["one.y"][-1] == 0.0
-    assert "declares" not in command("run", "--out", str(out), "--set", "one.step_size=0.01")
-    assert load_results(out)["one.y"][-1] == pytest.approx(0.1)
+    assert said(tmp_path)
+    assert status_of("check", tmp_path / "s.yaml") == 0
+    assert mentions(capsys.readouterr().err, "note", "0.001 s", "one.step_size=0.01")

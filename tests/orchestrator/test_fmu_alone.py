@@ -8,83 +8,67 @@ import zipfile
 import pytest
 
 from tests.command_line import status_of
-from tests.orchestrator.test_foreign import mostly_together, write_fmu
-from tests.refusals import mentions
+from tests.orchestrator.foreign_fmus import mostly_together, write_fmu
+from tests.refusals import each_mentions, mentions
 from yawbench.orchestrator.results.reader import load_results
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="compiles for Linux")
 EXPERIMENT = '<DefaultExperiment startTime="1" stopTime="3" stepSize="0.25"/><ModelVariables>'
 
+TIMES = "stop_time: 1\nstep_size: 0.5\n"
+
 
 @pytest.fixture
 def alone(library, tmp_path, capsys, monkeypatch):
-    """Write an FMU and call a command with it; return the status and all that was printed."""
+    """Write an FMU and call a command with it, which ends with this status; return all that was printed."""
     monkeypatch.chdir(tmp_path)
 
-    def call(*command, experiment=EXPERIMENT, kinds=("Real", "Integer"), guid="{good}"):
+    def call(command, *more, status=0, experiment=EXPERIMENT, guid="{good}"):
         write_fmu(
-            tmp_path / "other.fmu", library, *kinds, guid=guid,
+            tmp_path / "other.fmu", library, "Real", "Integer", guid=guid,
             change=lambda xml: xml.replace("<ModelVariables>", experiment),
         )  # fmt: skip
-        first, *rest = command
-        status = status_of(first, "other.fmu", *rest)
-        printed = capsys.readouterr()
-        return status, printed.out, printed.err
+        given = status_of(command, "other.fmu", *more)
+        printed = "".join(capsys.readouterr())
+        assert given == status, printed
+        return printed
 
     return call
 
 
 def test_it_runs_over_its_default_experiment_with_its_start_values(alone, tmp_path):
-    status, _, said = alone("run", "--out", "out")
-    assert status == 0, said
+    alone("run", "--out", "out")
     results = load_results(tmp_path / "out")
     assert results.time.tolist() == [1.0 + 0.25 * k for k in range(9)]
     constants = results.record.fmus["other"].constants
     assert set(results["other.Real_out"]) == {2.0 * float(constants["Real_in"])}
     assert set(results["other.Integer_out"]) == {2 * int(constants["Integer_in"])}
-
-
-def test_options_change_it_as_a_scenario(alone, tmp_path):
-    setting = ("--set", "inputs.Real_in=0.5", "--set", "stop_time=1.5")
-    status, _, said = alone("run", "--out", "out", *setting)
-    assert status == 0, said
+    alone("run", "--out", "out", "--set", "inputs.Real_in=0.5", "--set", "stop_time=1.5")
     results = load_results(tmp_path / "out")
     assert (results.time[-1], results["other.Real_out"][-1]) == (1.5, 1.0)
 
 
-@pytest.mark.parametrize(
-    ("stated", "step"), [('stopTime="3"', 0.006), ('stopTime="3" stepSize="0.7"', 0.7), ("", None)]
-)
+@pytest.mark.parametrize(("stated", "step"), [('stopTime="3"', 0.006), ('stopTime="3" stepSize="0.7"', 0.7)])
 def test_what_the_default_experiment_leaves_open(alone, tmp_path, stated, step):
-    status, _, said = alone(
-        "run", "--out", "out", experiment=f"<DefaultExperiment {stated}/><ModelVariables>"
-    )
-    if step is None:
-        assert status == 2
-        assert mentions(said, "other.fmu", "--set stop_time=")
-        assert mentions(said, "other.fmu", "--set step_size=")
-        return
-    assert status == 0, said
-    assert load_results(tmp_path / "out").time[1] == step
-    assert load_results(tmp_path / "out").time[-1] == round(3 / step) * step
+    alone("run", "--out", "out", experiment=f"<DefaultExperiment {stated}/><ModelVariables>")
+    times = load_results(tmp_path / "out").time
+    assert (times[1], times[-1]) == (step, round(3 / step) * step)
 
 
-def test_it_is_checked_and_drawn(alone, tmp_path):
-    status, out, said = alone("check")
-    assert status == 0, said
-    assert mentions(out, "2 s", "8 steps", "250 ms")
-    status, _, said = alone("plot")
-    assert status == 0, said
-    assert [*(tmp_path / "results").glob("**/overview.svg")]
+def test_without_a_stop_time_it_asks_for_what_it_needs(alone):
+    said = alone("run", status=2, experiment="<DefaultExperiment/><ModelVariables>")
+    assert each_mentions(said, ("other.fmu", "--set stop_time="), ("other.fmu", "--set step_size="))
 
 
-def test_show_tells_variables_and_times(alone):
-    status, out, _ = alone("show")
-    assert status == 0
+def test_it_is_shown_checked_and_drawn(alone, tmp_path):
+    shown = alone("show")
     for line in (("Real_in", "input", "Real"), ("Integer_out", "output", "Integer"), ("answer", "0 to 4")):
-        assert mentions(out, *line)
-    assert mentions(out, "stop time", "3 s")
-    assert "Wired by" not in out
+        assert mentions(shown, *line)
+    assert mentions(shown, "stop time", "3 s")
+    assert "Wired by" not in shown
+    assert mentions(alone("check"), "2 s", "8 steps", "250 ms")
+    alone("plot")
+    assert [*(tmp_path / "results").glob("**/overview.svg")]
 
 
 def test_show_names_the_inputs_that_would_stay_unconnected_and_what_becomes_of_them(
@@ -129,38 +113,32 @@ def test_an_unconnected_input_of_a_foreign_fmu_keeps_its_start_value_and_a_note_
     library, tmp_path, monkeypatch, capsys
 ):
     monkeypatch.chdir(tmp_path)
-    write_fmu(
-        tmp_path / "other.fmu",
-        library,
-        "Real",
-        change=lambda xml: xml.replace('<Real start="0"', '<Real start="0.75"'),
-    )
-    scenario = "title: One\nstop_time: 1\nstep_size: 0.5\nunits: {a: {fmu: ./other.fmu}}\n"
-    (tmp_path / "one.yaml").write_text(scenario)
+    start = {"change": lambda xml: xml.replace('<Real start="0"', '<Real start="0.75"')}
+    write_fmu(tmp_path / "other.fmu", library, "Real", **start)
+    (tmp_path / "one.yaml").write_text(f"{TIMES}units: {{a: {{fmu: ./other.fmu}}}}\n")
     assert status_of("run", "one.yaml", "--out", "out") == 0
     assert mentions(capsys.readouterr().err, "note", "a", "Real_in = 0.75", "start value")
     assert set(load_results(tmp_path / "out")["a.Real_out"]) == {1.5}
 
 
-def test_an_input_that_an_output_resembles_is_an_error_as_before(library, tmp_path, monkeypatch, capsys):
+def test_an_input_that_an_output_resembles_is_an_error(library, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     write_fmu(tmp_path / "a.fmu", library, "Real", change=lambda xml: xml.replace("Real_out", "yaw_rate"))
     write_fmu(tmp_path / "b.fmu", library, "Real", change=lambda xml: xml.replace("Real_in", "YawRate"))
-    scenario = "title: Two\nstop_time: 1\nstep_size: 0.5\nunits: {a: {fmu: ./a.fmu}, b: {fmu: ./b.fmu}}\n"
-    (tmp_path / "two.yaml").write_text(scenario)
+    (tmp_path / "two.yaml").write_text(f"{TIMES}units: {{a: {{fmu: ./a.fmu}}, b: {{fmu: ./b.fmu}}}}\n")
     assert status_of("run", "two.yaml", "--out", "out") == 2
     assert mentions(capsys.readouterr().err, "b.YawRate", "a.yaw_rate")
 
 
 @mostly_together
 def test_log_shows_levels_and_categories(alone, isolate):
-    status, _, said = alone("run", "--out", "o", "--log", "info", *isolate, guid="{chatty}")
-    assert status == 0, said
-    assert said.count("OK: other at t = ") == 8
-    assert mentions(said, "t = 1.25 s", "[steps]", "at 1.25")
-    assert "OK:" not in alone("run", "--out", "o", "--log", "warning", *isolate, guid="{chatty}")[2]
-    assert "OK:" not in alone("run", "--out", "o", "--log", "info:other", *isolate, guid="{chatty}")[2]
-    assert "OK:" in alone("run", "--out", "o", "--log", "info:steps", *isolate, guid="{chatty}")[2]
-    status, _, said = alone("run", "--out", "o", "--log", "loud")
-    assert status == 2
-    assert mentions(said, "--log loud", "error", "warning", "info")
+    def said(level, **keys):
+        return alone("run", "--out", "o", "--log", level, *isolate, guid="{chatty}", **keys)
+
+    everything = said("info")
+    assert everything.count("OK: other at t = ") == 8
+    assert mentions(everything, "t = 1.25 s", "[steps]", "at 1.25")
+    assert "OK:" not in said("warning")
+    assert "OK:" not in said("info:other")
+    assert "OK:" in said("info:steps")
+    assert mentions(said("loud", status=2), "--log loud", "error", "warning", "info")

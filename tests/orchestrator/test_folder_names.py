@@ -56,3 +56,21 @@ def test_a_name_may_be_given():
 def test_an_invalid_folder_name_is_refused(name):
     with refused(ScenarioError, names=("--name", "--out") if "\n" not in name else ("--name",)):
         folder(name=name)
+
+
+@pytest.mark.parametrize(
+    "file", ["../a.yaml", "../../a.yaml", "a/../../a.yaml", "/a.yaml", "./a.yaml", "a/./b.yaml"]
+)
+def test_a_default_folder_is_below_results_whatever_the_path_of_the_file(file, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for changes in ((), (Override.of("controller", "../../off", "--swap"),)):
+        parts = default_folder(Path(f"{file}.yaml"), changes, suffix="-compare").parts
+        assert parts[0] == "results"
+        assert ".." not in parts
+        assert 2 <= len(parts) <= 3
+
+
+@pytest.mark.parametrize("file", ["a/...yaml", "a/..yaml", "..."])
+def test_a_file_that_no_folder_can_be_called_after_is_a_sentence(file):
+    with refused(ScenarioError, "folder-invalid", names=("--out", file)):
+        default_folder(Path(file))

@@ -8,13 +8,11 @@ import sys
 
 import numpy as np
 import pytest
-from pydantic import BaseModel
 
 from tests.orchestrator.fakes import Clock, Function, Stage, make_plan
 from tests.refusals import each_mentions, mentions, refused, texts_of
 from yawbench.foundation.errors import ResultsError, SimulationError
 from yawbench.foundation.safe_files import write_whole
-from yawbench.orchestrator.master.instance import StepCalls
 from yawbench.orchestrator.master.simulate import simulate
 from yawbench.orchestrator.results import file_formats
 from yawbench.orchestrator.results import recorder as module
@@ -24,9 +22,9 @@ from yawbench.orchestrator.results.run_record import RunRecord
 from yawbench.orchestrator.results.salvage import salvage
 
 
-def record(folder, table, *, real=None, others=None, run=None):
+def record(folder, table, *, columns=None, real=None, others=None, run=None):
     """Write a table (first column time) as a run does."""
-    columns = [f"unit.v{i}" for i in range(1, table.shape[1])]
+    columns = columns or [f"unit.v{i}" for i in range(1, table.shape[1])]
     writer = Recorder(folder, columns, real or [True] * len(columns))
     for begin in range(0, len(table), BLOCK):
         block = table[begin : begin + BLOCK]
@@ -46,7 +44,7 @@ def table(rows, columns=3):
     return values
 
 
-@pytest.mark.parametrize("rows", [1, BLOCK - 1, BLOCK, BLOCK + 1, 3 * BLOCK + 7])
+@pytest.mark.parametrize("rows", [1, BLOCK, BLOCK + 1])
 def test_numbers_are_read_back_to_the_last_bit(rows, tmp_path):
     values = table(rows)
     record(tmp_path, values)
@@ -60,9 +58,9 @@ def hard_numbers():
     powers = np.concatenate([2.0 ** np.arange(-1074, 1024), 10.0 ** np.arange(-323, 309)])
     near = [np.nextafter(powers, 0.0), powers, np.nextafter(powers, math.inf)]
     generator = np.random.default_rng(1)
-    bits = generator.integers(0, 2**64, 300_000, dtype=np.uint64).view(float)
-    round_ones = np.round(generator.uniform(-1e4, 1e4, 50_000), 3)
-    whole = generator.integers(-(10**17), 10**17, 50_000).astype(float)
+    bits = generator.integers(0, 2**64, 60_000, dtype=np.uint64).view(float)
+    round_ones = np.round(generator.uniform(-1e4, 1e4, 10_000), 3)
+    whole = generator.integers(-(10**17), 10**17, 10_000).astype(float)
     special = [0.0, -0.0, math.nan, -math.nan, math.inf, -math.inf, 9.5e15, 1e16, 1e-4, 9.9e-5, 2.0**53 + 2]
     return np.concatenate([*near, *(-one for one in near), bits, round_ones, whole, special])
 
@@ -70,10 +68,10 @@ def hard_numbers():
 @pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler")
 def test_numbers_are_written_as_python_writes_them():
     numbers = hard_numbers()
+    numbers = numbers[: len(numbers) // 3 * 3].reshape(-1, 3)
     assert file_formats._writer() is not None
-    text = file_formats.rows_text(numbers[: len(numbers) // 3 * 3].reshape(-1, 3)).decode()
-    rows = numbers[: len(numbers) // 3 * 3].reshape(-1, 3).tolist()
-    assert text.splitlines() == [",".join(map(repr, row)) for row in rows]
+    text = file_formats.rows_text(numbers).decode()
+    assert text.splitlines() == [",".join(map(repr, row)) for row in numbers.tolist()]
 
 
 def test_without_a_compiler_the_bytes_are_the_same(tmp_path, monkeypatch):
@@ -92,23 +90,17 @@ def test_the_file_is_a_plain_csv_with_a_header(tmp_path):
 
 def test_names_with_commas_and_quotes_are_quoted(tmp_path):
     names = ["unit.matrix[1,2]", 'unit."odd"', "unit.Ümläut"]
-    writer = Recorder(tmp_path, names, [True] * 3)
-    writer.rows[0][:] = [0.0, 1.0, 2.0, 3.0]
-    writer.write(1)
-    writer.finish(RunRecord(status="completed", units={}))
-    writer.close()
+    record(tmp_path, np.array([[0.0, 1.0, 2.0, 3.0]]), columns=names)
     with (tmp_path / "results.csv").open(encoding="utf-8", newline="") as stream:
         assert next(csv.reader(stream)) == ["time", *names]
     assert [float(c[0]) for c in load_results(tmp_path).columns.values()] == [1.0, 2.0, 3.0]
 
 
 def test_columns_keep_their_order_when_some_are_no_reals(tmp_path):
-    writer = Recorder(tmp_path, ["a.n", "a.x", "a.s", "a.y", "a.b"], [False, True, False, True, False])
-    writer.rows[0][:] = [0.0, 1.0, 2.0]
-    writer.others.append([7, 'say "ä",\nthen stop', True])
-    writer.write(1)
-    writer.finish(RunRecord(status="completed", texts=["a.s"], units={}))
-    writer.close()
+    columns, real = ["a.n", "a.x", "a.s", "a.y", "a.b"], [False, True, False, True, False]
+    others = [[7, 'say "ä",\nthen stop', True]]
+    row, run = np.array([[0.0, 1.0, 2.0]]), {"texts": ["a.s"]}
+    record(tmp_path, row, columns=columns, real=real, others=others, run=run)
     results = load_results(tmp_path)
     assert {name: column[0] for name, column in results.columns.items()} == {
         "a.n": 7, "a.x": 1.0, "a.s": 'say "ä",\nthen stop', "a.y": 2.0, "a.b": 1,
@@ -117,12 +109,8 @@ def test_columns_keep_their_order_when_some_are_no_reals(tmp_path):
 
 def test_the_record_may_hold_numbers_that_json_does_not_know(tmp_path):
     record(tmp_path, table(2), run={"error": {"inputs": {"x": math.nan, "y": -math.inf, "n": np.float64(2)}}})
-    text = (tmp_path / "run.json").read_text()
-    assert json.loads(text, parse_constant=pytest.fail)["error"]["inputs"] == {
-        "x": "nan",
-        "y": "-inf",
-        "n": 2.0,
-    }
+    read = json.loads((tmp_path / "run.json").read_text(), parse_constant=pytest.fail)
+    assert read["error"]["inputs"] == {"x": "nan", "y": "-inf", "n": 2.0}
 
 
 def test_earlier_results_stay_until_the_new_ones_are_whole(tmp_path):
@@ -136,18 +124,6 @@ def test_earlier_results_stay_until_the_new_ones_are_whole(tmp_path):
     writer.close()
     assert load_results(tmp_path).record.title == "second"
     assert sorted(p.name for p in tmp_path.iterdir()) == ["results.csv", "run.json"]
-
-
-def test_a_folder_that_cannot_be_made_is_one_sentence(tmp_path):
-    (tmp_path / "file").write_text("")
-    with refused(ResultsError, "results-unwritable", names=("out", "results", "directory")):
-        Recorder(tmp_path / "file" / "out", ["a.x"], [True])
-
-
-def test_a_file_in_place_of_the_folder_is_one_sentence(tmp_path):
-    (tmp_path / "out").write_text("")
-    with refused(ResultsError, "results-unwritable", names=("--out", "folder")):
-        Recorder(tmp_path / "out", ["a.x"], [True])
 
 
 def test_a_path_that_is_no_utf_8_does_not_cost_the_results(tmp_path):
@@ -193,19 +169,17 @@ def test_a_disk_that_fills_up_keeps_whole_rows_and_says_so(tmp_path):
 def test_a_run_whose_record_did_not_fit_is_salvaged_with_every_row(tmp_path, monkeypatch):
     record(tmp_path, table(2 * BLOCK), run={"title": "first"})
     answers = iter([write_whole, no_space])  # the first is of the record that says that the run has begun
+    units = {"a": Clock(x=math.sin)}
+    names = ("disk", "'yawbench salvage")
     with monkeypatch.context() as patched:
-        patched.setattr(
-            module, "write_whole", lambda *args, **kwargs: next(answers, write_whole)(*args, **kwargs)
-        )
-        units = {"a": Clock(x=math.sin)}
-        with pytest.raises(SimulationError) as caught:
-            simulate(make_plan(units, step="1/1000", n_steps=3000), tmp_path, opener=Stage(units))
-    assert (caught.value.code, caught.value.exit_status) == ("results-unwritable", 1)
-    assert mentions(caught.value, "disk", "'yawbench salvage")
+        patched.setattr(module, "write_whole", lambda *args: next(answers, write_whole)(*args))
+        with refused(SimulationError, "results-unwritable", names=names) as caught:
+            simulate(make_plan(units, step="1/1000", n_steps=1300), tmp_path, opener=Stage(units))
+    assert caught.value.exit_status == 1
     with refused(ResultsError, "run-died"):
         load_results(tmp_path)
-    assert salvage(tmp_path) == (tmp_path / "failed", 3001)
-    assert len(load_results(tmp_path / "failed").time) == 3001
+    assert salvage(tmp_path) == (tmp_path / "failed", 1301)
+    assert len(load_results(tmp_path / "failed").time) == 1301
     assert load_results(tmp_path).record.title == "first"
 
 
@@ -219,47 +193,40 @@ def _lengthened(file):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="open files cannot be removed")
-@pytest.mark.parametrize("format", file_formats.FILES)
-@pytest.mark.parametrize("change", [os.unlink, _truncated, _lengthened])
+@pytest.mark.parametrize(
+    ("format", "change"),
+    [
+        *(("csv", change) for change in (os.unlink, _truncated, _lengthened)),
+        *(("parquet", change) for change in (os.unlink, _lengthened)),  # which is empty until the end
+    ],
+)
 def test_a_file_of_results_that_something_else_changes_during_the_run_fails_it(
     format, change, tmp_path, monkeypatch
 ):
-    if format != "csv" and change is _truncated:
-        pytest.skip("the file is empty until the end")
     monkeypatch.setattr(recorder_of("parquet"), "CHUNK", BLOCK)
     file = tmp_path / f"{file_formats.FILES[format]}.part"
     times = []
 
     def course(time):
         times.append(time)
-        if len(times) == 1500:  # after the first blocks
+        if len(times) == 1100:  # after the first blocks
             change(file)
         return time
 
     units = {"a": Clock(x=course)}
-    with pytest.raises(SimulationError) as caught:
-        simulate(make_plan(units, step="1/1000", n_steps=3000), tmp_path, opener=Stage(units), format=format)
-    assert (caught.value.code, caught.value.exit_status) == ("results-unwritable", 1)
-    assert file.name in str(caught.value)
-    with pytest.raises(ResultsError) as missing:
+    with refused(SimulationError, "results-unwritable", names=(file.name,)) as caught:
+        simulate(make_plan(units, step="1/1000", n_steps=2000), tmp_path, opener=Stage(units), format=format)
+    assert caught.value.exit_status == 1
+    with refused(ResultsError, "results-missing"):
         load_results(tmp_path)
-    assert missing.value.code == "results-missing"
 
 
 def test_a_run_that_did_not_record_every_row_has_failed(tmp_path, monkeypatch):
-    def forget(self, count):
-        if count < BLOCK:  # the last block
-            self.others.clear()
-        else:
-            plain(self, count)
-
     plain = Recorder.write
-    monkeypatch.setattr(Recorder, "write", forget)
+    monkeypatch.setattr(Recorder, "write", lambda self, count: plain(self, count) if count == BLOCK else None)
     units = {"a": Clock(x=math.sin)}
-    with pytest.raises(SimulationError) as caught:
+    with refused(SimulationError, "results-unwritable", names=(f"{BLOCK} of 801 rows",)):
         simulate(make_plan(units, step="1/1000", n_steps=800), tmp_path, opener=Stage(units))
-    assert caught.value.code == "results-unwritable"
-    assert f"{BLOCK} of 801 rows" in str(caught.value)
     assert load_results(tmp_path).record.status == "failed"
 
 
@@ -269,27 +236,9 @@ def test_memory_that_does_not_suffice_is_one_sentence(tmp_path):
             raise MemoryError
         return time
 
-    class Greedy(Stage):
-        def __call__(self, *arguments):
-            instance = super().__call__(*arguments)
-            connect = instance.connect
-
-            def connected(buffers):
-                calls = connect(buffers)
-
-                def step():
-                    greedy(buffers.time.value)
-                    return calls.step()
-
-                return StepCalls(calls.set, step, calls.get)
-
-            instance.connect = connected
-            return instance
-
-    units = {"a": Clock(x=math.sin)}
-    with pytest.raises(SimulationError) as caught:
-        simulate(make_plan(units, step="1/100", n_steps=100), tmp_path, opener=Greedy(units))
-    assert caught.value.code == "memory-exhausted"
+    units = {"a": Clock(x=greedy)}
+    with refused(SimulationError, "memory-exhausted"):
+        simulate(make_plan(units, step="1/100", n_steps=100), tmp_path, opener=Stage(units))
     assert load_results(tmp_path).record.status == "failed"
 
 
@@ -311,22 +260,3 @@ def test_a_failure_that_cannot_be_recorded_says_both(tmp_path, monkeypatch):
     assert each_mentions(texts_of(caught.value), ("a:", "0 s", "a.x", "b.x", "x"), ("out", "results", "disk"))
     with refused(ResultsError, "run-died"):
         load_results(tmp_path / "out")
-
-
-def test_every_key_that_a_run_writes_is_a_field_of_its_record(tmp_path):
-    units = {"a": Clock(x=math.sin)}
-    simulate(make_plan(units), tmp_path, opener=Stage(units))
-    written = json.loads((tmp_path / "run.json").read_text())
-
-    def foreign(part):
-        """Return the keys that a part of the record has beside its fields."""
-        parts = [part, *[x for x in vars(part).values() if isinstance(x, BaseModel)]]
-        parts += [x for one in vars(part).values() if isinstance(one, list) for x in one]
-        parts += [x for one in vars(part).values() if isinstance(one, dict) for x in one.values()]
-        return {key for one in parts if isinstance(one, BaseModel) for key in one.model_extra or {}}
-
-    record = RunRecord.model_validate(written)
-    assert foreign(record) == set()
-    assert written.keys() <= RunRecord.model_fields.keys()
-    assert record.fmus["a"].name
-    assert json.loads(record.to_json()) == written
