@@ -162,42 +162,11 @@ def test_area_and_moment_of_two_clipped_sets_agree_with_quadrature(a, b):
     )
 
 
-@pytest.mark.parametrize("clip", [0.1, 0.5, 1.0])
-def test_one_clipped_outer_set_has_the_centroid_of_a_right_trapezium(clip):
-    sets = Partition.even(FIVE, 0.0, 4.0)
-    # A half triangle of base 1 cut at the height c: a rectangle 1 - c wide and a triangle.
-    area = clip * (1.0 - clip) + clip**2 / 2.0
-    moment = clip * (1.0 - clip) ** 2 / 2.0 + clip**2 / 2.0 * (1.0 - clip + clip / 3.0)
-    assert sets.centroid([clip, 0, 0, 0, 0]) == pytest.approx(moment / area, abs=1e-14)
-    assert sets.centroid([0, 0, 0, 0, clip]) == pytest.approx(4.0 - moment / area, abs=1e-14)
-
-
-@pytest.mark.parametrize("clip", [0.1, 0.5, 1.0])
-def test_one_clipped_inner_set_has_its_peak_as_centroid(clip):
-    assert Partition.even(FIVE).centroid([0, clip, 0, 0, 0]) == pytest.approx(-0.5, abs=1e-14)
-
-
 def test_outputs_reach_their_range_up_to_a_third_of_the_outermost_spacing():
     (highest,) = standard_seven()(1.0, 1.0)
     assert highest == pytest.approx(1.0 - 1.0 / 9.0, abs=1e-14)
     eps, k_d = paper_b()(1.0, 0.09)
     assert (eps / 3.0, k_d / 10.0) == pytest.approx((11.0 / 12.0, 11.0 / 12.0), abs=1e-14)
-
-
-@pytest.mark.parametrize("make", [standard_seven, standard_five])
-def test_an_antisymmetric_table_gives_an_antisymmetric_surface(make):
-    system = make()
-    for x, y in sample(system, 200, beyond=0.1):
-        assert system(x, y)[0] == pytest.approx(-system(-x, -y)[0], abs=1e-14)
-    assert system(0.0, 0.0) == [0.0]
-
-
-@pytest.mark.parametrize("make", [standard_seven, standard_five])
-def test_a_monotone_table_gives_a_surface_monotone_at_the_peaks(make):
-    system = make()
-    grid = np.array([[system(x, y)[0] for y in system.columns.peaks] for x in system.rows.peaks])
-    assert np.all(np.diff(grid, axis=0) >= -1e-15)
-    assert np.all(np.diff(grid, axis=1) >= -1e-15)
 
 
 @pytest.mark.parametrize("make", SYSTEMS)
@@ -217,24 +186,6 @@ def test_outputs_stay_inside_their_range_and_are_continuous(make):
         for sets, u, v in zip(system.outputs, here, near, strict=True):
             assert sets.peaks[0] < u < sets.peaks[-1]
             assert u == pytest.approx(v, abs=1e-6)
-
-
-def grades_of(sets, x):
-    """The grades of `x` in all sets."""
-    k, t = sets.locate(x)
-    grades = [0.0] * len(sets.peaks)
-    grades[k], grades[k + 1] = 1.0 - t, t
-    return grades
-
-
-@pytest.mark.parametrize("sets", [Partition.even(SEVEN), Partition("a b c", [-3.0, 0.5, 1.0])])
-def test_grades_are_a_partition_of_unity_and_one_at_the_peaks(sets):
-    for x in np.linspace(-4.0, 4.0, 81):
-        grades = grades_of(sets, float(x))
-        assert sum(grades) == pytest.approx(1.0, abs=1e-15)
-        assert min(grades) >= 0.0
-    for k, peak in enumerate(sets.peaks):
-        assert grades_of(sets, peak)[k] == 1.0
 
 
 def test_gaussian_grades_are_one_at_the_centre_and_1_over_e_one_width_off():

@@ -28,15 +28,6 @@ def test_inside_it_is_the_sine():
         assert sine_steer(t, P) == pytest.approx(0.04 * sin(pi * (t - 1.0)), abs=1e-16)
 
 
-def test_the_first_quarter_is_to_the_left_with_the_full_amplitude():
-    assert sine_steer(1.5, P) == pytest.approx(0.04, rel=1e-15)
-
-
-def test_mean_steer_angle_over_whole_periods_is_zero():
-    n = 4000
-    assert abs(sum(sine_steer(1.0 + 4.0 * k / n, P) for k in range(n))) / n < 1e-16
-
-
 DWELL = SineWithDwellParameters(amplitude=2.0, start_time=1.0)
 
 

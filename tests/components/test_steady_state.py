@@ -45,12 +45,6 @@ def test_the_unlimited_reference_is_a_state_of_rest_of_the_single_track_equation
     assert A * front - B * rear == pytest.approx(0.0, abs=1e-9)
 
 
-def test_at_walking_pace_the_car_follows_its_wheels():
-    r, beta = reference(0.1, 0.01, p=FREE)
-    assert r == pytest.approx(0.01 * 0.1 / L, rel=1e-6)
-    assert beta == pytest.approx(B / L * 0.1, rel=1e-6)
-
-
 def test_the_reference_within_the_limits_is_that_without():
     assert reference(0.01, 15.0) == reference(0.01, 15.0, p=FREE)
 
@@ -72,12 +66,6 @@ def test_the_sideslip_is_limited_to_that_of_the_limited_yaw_rate():
 def test_the_sideslip_never_exceeds_its_own_limit():
     assert reference(0.5, 1.0)[1] == P.sideslip_limit
     assert reference(-0.5, 1.0)[1] == -P.sideslip_limit
-
-
-def test_the_sideslip_vanishes_where_its_gain_crosses_zero():
-    v = (B * C * L / (M * A)) ** 0.5
-    assert v == pytest.approx(16.1, abs=0.05)
-    assert reference(0.05, v)[1] == pytest.approx(0.0, abs=1e-15)
 
 
 def test_a_standing_car_has_no_yaw_rate():

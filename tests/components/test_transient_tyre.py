@@ -6,13 +6,12 @@ from math import exp, pi, sin
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 
 from yawbench.components.cars.wheel_kinematics import slip_angle, slip_ratio
 from yawbench.components.plants.fourteen_dof import FourteenDof
 from yawbench.components.plants.seven_dof import SevenDof
 from yawbench.components.tyre_models.pacejka_2012_set import COMMON, LONGITUDINAL, REST
-from yawbench.components.tyre_models.relaxation import deflected, gripped
+from yawbench.components.tyre_models.relaxation import gripped
 from yawbench.components.tyres.magic_formula_62 import MagicFormula62
 from yawbench.components.tyres.magic_formula_62_transient import MagicFormula62Transient
 from yawbench.vocabulary.wheels import wheels
@@ -86,14 +85,6 @@ def test_a_run_begins_in_steady_motion():
     later = tyre.step(5.0, **inputs)
     assert first["tyre_force_y_rr"] == pytest.approx(later["tyre_force_y_rr"], rel=1e-12)
     assert abs(first["tyre_force_y_rr"]) > 500.0
-
-
-def test_the_deflection_is_that_of_its_differential_equation():
-    u_0, s, v, sigma, h = 0.01, 0.7, 6.0, 0.4, 0.13
-    answer = solve_ivp(lambda t, u: s - v * u / sigma, (0, h), [u_0], rtol=1e-11, atol=1e-14)
-    assert deflected(u_0, s, v, sigma, h) == pytest.approx(answer.y[0, -1], rel=1e-9)
-    assert deflected(u_0, s, 0.0, sigma, h) == pytest.approx(u_0 + s * h, rel=1e-12)
-    assert deflected(u_0, s, 1e-9, sigma, h) == pytest.approx(u_0 + s * h, rel=1e-8)
 
 
 def test_a_deflection_beyond_the_grip_is_kept_as_far_as_the_wheel_slides_its_way():

@@ -73,34 +73,6 @@ def test_steady_state_yaw_rate_matches_the_understeer_formula():
     assert beta == pytest.approx((B - M * A * SPEED**2 / (2 * c * L)) * gain, rel=1e-6)
 
 
-@pytest.mark.parametrize("frequency", [0.5, 2.0])
-def test_the_response_to_a_yaw_moment_is_that_of_the_linear_single_track_model(frequency):
-    c = 2 * 50000.0
-    s = 2j * pi * frequency
-    matrix = np.array(
-        [
-            [M * s + 2 * c / SPEED, M * SPEED + (A - B) * c / SPEED],
-            [(A - B) * c / SPEED, I_Z * s + (A * A + B * B) * c / SPEED],
-        ]
-    )
-    expected = np.linalg.solve(matrix, [0.0, 1.0])[1]
-    car, tyre = Stand(TwoDof), Stand(LinearTyre)
-    y = car.start()
-    names = [v.name for v in LinearTyre.variables if v.causality == "input" and "friction" not in v.name]
-    forces = tyre.start(**{n: y[n] for n in names})
-    before = forces
-    h, found = 1e-3, []
-    for k in range(4000):
-        middle = {n: 1.5 * forces[n] - 0.5 * before[n] for n in forces if "force_y" in n}
-        y = car.step(h, yaw_moment=100.0 * sin(2 * pi * frequency * (k + 0.5) * h), **middle)
-        before, forces = forces, tyre.step(h, **{n: y[n] for n in names})
-        found.append(y["yaw_rate"])
-    t = h * np.arange(1, 4001)
-    last = t > 2.0 + 0.5 * h
-    phasor = 2j * np.mean(np.array(found)[last] * np.exp(-2j * pi * frequency * t[last])) / 100.0
-    assert phasor / expected == pytest.approx(1.0, abs=3e-4)
-
-
 # ---- closed forms
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from math import log2
-
 import numpy as np
 import pytest
 
@@ -111,20 +109,6 @@ def test_a_car_at_rest_stays_at_rest_with_the_wheels_turned(plant, tyre, torque)
     assert not run.any()
 
 
-@pytest.mark.parametrize("plant", PLANTS)
-def test_driving_off_from_rest_is_calm(plant):
-    run = drive(
-        plant,
-        MagicFormula,
-        torque=(150.0,),
-        until=2.0,
-        speed=0.0,
-        record=["velocity_x", *four("wheel_speed", 0.0)],
-    )
-    assert np.diff(run[:, 100:]).min() > 0.0  # they only ever gain speed
-    assert run[0, -1] > 1.0
-
-
 MAGIC = coefficients(MagicFormulaParameters(), "front")
 SLOW = 7.0
 BRAKES = (-350.0, -350.0, -150.0, -150.0)
@@ -165,10 +149,3 @@ def test_where_slip_is_faster_than_the_step_a_tyre_that_tells_its_stiffness_is_n
     told, silent = (slow_errors(slow_braking, tyre, 2e-3) for tyre in (MagicFormula, SilentMagicFormula))
     assert np.all(told < 7e-4), told
     assert np.all(told < 0.5 * silent)
-
-
-def test_there_too_the_order_is_two(slow_braking):
-    coarse, fine = (slow_errors(slow_braking, MagicFormula, h) for h in (2e-3, 5e-4))
-    assert np.all(fine < 7e-5)
-    assert log2(coarse[0] / fine[0]) / 2 > 1.8  # speed
-    assert log2(coarse[1] / fine[1]) / 2 > 1.8  # yaw rate

@@ -8,13 +8,10 @@ from math import isfinite, pi, sin
 import pytest
 
 from yawbench.components.control_laws.slip_control import SlipControlParameters, slip_torque, wheel_torque
-from yawbench.components.plants.eight_dof import EightDof
 from yawbench.components.tyre_models.slip_curve import slip_for_force
-from yawbench.components.tyres.magic_formula import MagicFormula
 from yawbench.components.wheel_controls.slip import Slip, SlipParameters
 from yawbench.vocabulary.wheels import WHEELS
 
-from .loop import Loop, Straight
 from .stand import Stand, four, wheel_values
 from .tyre_curves import CAP, curve_of, slip_limits, tyre_curve
 
@@ -192,37 +189,6 @@ def test_braking_ends_at_rest_and_stays_there():
     rows = QuarterCar(6.0, mu=0.8, ts=0.001).run(lambda t: -2000.0, 2.0)
     assert max(abs(kappa) for kappa, _, _ in rows) < 0.1
     assert all(v < 1e-9 and abs(torque) < 1e-6 for _, torque, v in rows[-300:])
-
-
-def drive(*, total, steer, speed, low_friction, until=1.5):
-    """Return (largest |kappa|, largest |beta|, final yaw rate, final speed) of paper B's car on mu 0.3."""
-    constants = {**four("force_request", 0.25 * total), **four("friction", 0.3), "steer_angle": steer}
-    units = [
-        (EightDof, {"initial_speed": speed}),
-        (MagicFormula, {"low_friction": low_friction}),
-        (Slip, {"low_friction": low_friction}),
-        (Straight, {}),
-    ]
-    names = [f"slip_ratio_{w}" for w in WHEELS]
-    loop = Loop(units, algorithm="extrapolated", constants=constants)
-    rows = loop.run(
-        until, round(until / 0.001), lambda now: (max(abs(now[n]) for n in names), abs(now["sideslip"]))
-    )
-    return max(k for k, _ in rows), max(b for _, b in rows), loop["yaw_rate"], loop["velocity_x"]
-
-
-@pytest.mark.parametrize("low_friction", ["scale", "similarity"])
-@pytest.mark.parametrize("steer", [0.03, 0.0])
-@pytest.mark.parametrize(("total", "speed"), [(-6000.0, 80.0 / 3.6), (6000.0, 10.0)])
-@pytest.mark.sampled(1)
-def test_a_car_asked_for_more_than_its_grip_keeps_its_wheels_turning_and_its_course(
-    total, speed, steer, low_friction
-):
-    kappa, beta, yaw_rate, v_x = drive(total=total, speed=speed, steer=steer, low_friction=low_friction)
-    assert kappa < 0.15
-    assert beta < 0.06
-    assert (yaw_rate > 0.05) if steer else (yaw_rate == 0.0)
-    assert abs(v_x - speed) > 4.0
 
 
 def test_the_unit_gives_each_wheel_its_own_torque_and_shows_its_slip_target():
