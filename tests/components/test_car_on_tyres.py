@@ -16,7 +16,7 @@ from yawbench.components.tyres.linear import LinearTyre
 from yawbench.vocabulary.wheels import WHEELS
 
 from . import monolith
-from .loop import Hold, Loop
+from .loop import Hold, drive_on
 from .stand import four
 
 pytestmark = pytest.mark.sampled(1)
@@ -28,9 +28,8 @@ L = A + B
 SPEED = 25.0
 
 
-def drive(units, *, algorithm="extrapolated", mu=0.65, until=6.0, h=0.001, read=("yaw_rate",), **constants):
-    loop = Loop(units, algorithm=algorithm, constants={**four("friction", mu), **constants})
-    return np.array(loop.run(until, round(until / h), lambda now: [now[name] for name in read]))
+def drive(units, *, mu=0.65, until=6.0, read=("yaw_rate",), **more):
+    return drive_on(units, until=until, record=read, mu=mu, **more).T
 
 
 # ---- linear theory

@@ -16,7 +16,7 @@ from yawbench.components.tyres.dugoff import Dugoff
 from yawbench.components.tyres.magic_formula import MagicFormula
 
 from . import monolith, monolith_b
-from .loop import Loop
+from .loop import drive_on
 from .magic import forces_and_moment
 from .stand import Stand, four, wheel_values
 
@@ -34,12 +34,9 @@ def lateral(force: float) -> dict[str, float]:
 
 def drive(tyre, *, plant=EightDof, mu=0.8, steer=0.0, until=1.0, h=1e-3, record, torque=(0.0,), **parameters):
     """Return the recorded signals (rows) of a car driven through one loop of plant and tyre."""
-    loop = Loop(
-        [(Sine, {"amplitude": steer, "frequency": 0.4, "start_time": 0.2}), (plant, parameters), (tyre, {})],
-        algorithm="extrapolated",
-        constants={**four("friction", mu), **four("wheel_torque", *torque)},
-    )
-    return np.array(loop.run(until, round(until / h), lambda each: [each[name] for name in record])).T
+    sine = {"amplitude": steer, "frequency": 0.4, "start_time": 0.2}
+    units = [(Sine, sine), (plant, parameters), (tyre, {})]
+    return drive_on(units, mu=mu, until=until, h=h, record=record, torque=torque)
 
 
 def roll_energy(y: dict[str, float]) -> float:

@@ -7,7 +7,6 @@ from math import atan2, cos, log2, pi, sin
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 
 from tests.evidence import measured
 from yawbench.components.cars.load_transfer import quasi_static_loads
@@ -21,7 +20,8 @@ from yawbench.components.tyre_models.bakker_1987 import (
 from yawbench.components.tyres.linear import LinearTyre
 from yawbench.components.tyres.magic_formula_1987 import MagicFormula1987
 
-from .loop import Hold, Loop
+from . import monolith
+from .loop import Hold, drive_on
 from .magic import forces_1987
 from .stand import Stand, four, wheel_values
 
@@ -31,26 +31,10 @@ L = A + B
 SPEED, G = 25.0, 9.81
 
 
-def drive(
-    tyre=MagicFormula1987,
-    *,
-    driver=None,
-    mu=0.5,
-    until=3.0,
-    h=1e-3,
-    record,
-    tyre_parameters=None,
-    **constants,
-):
+def drive(tyre=MagicFormula1987, *, mu=0.5, until=3.0, h=1e-3, record, driver=None, **tyres):
     """Return the recorded signals (rows) of driver, car and tyre in a loop."""
-    driver = driver or (Sine, {"amplitude": 0.05, "frequency": 0.5, "start_time": 0.5})
-    car = {k: constants.pop(k) for k in list(constants) if k.startswith("initial")}
-    loop = Loop(
-        [driver, (TwoDof, car), (tyre, tyre_parameters or {})],
-        algorithm="extrapolated",
-        constants={**four("friction", mu), **constants},
-    )
-    return np.array(loop.run(until, round(until / h), lambda now: [now[name] for name in record])).T
+    sine = Sine, {"amplitude": 0.05, "frequency": 0.5, "start_time": 0.5}
+    return drive_on([driver or sine, (TwoDof, {}), (tyre, tyres)], until=until, h=h, record=record, mu=mu)
 
 
 # ---- linear theory
@@ -65,7 +49,7 @@ def test_steady_state_yaw_rate_matches_the_understeer_formula():
         until=8.0,
         h=4e-3,
         record=record,
-        tyre_parameters={"cornering_stiffness": c},
+        cornering_stiffness=c,
     )[:, -1]
     k = M / L**2 * (B - A) / (2 * c)
     gain = 1e-4 / (L * (1 + k * SPEED**2))
@@ -170,15 +154,7 @@ def exact(mu, until=3.0):
         ]
 
     times = np.linspace(0.0, until, round(until / 4e-3) + 1)
-    columns, state = np.empty((5, len(times))), np.zeros(5)
-    for begin, end in ((0.0, 0.5), (0.5, 2.5), (2.5, until)):
-        piece = solve_ivp(
-            derivatives, (begin, end), state, method="DOP853", rtol=1e-10, atol=1e-11, dense_output=True
-        )
-        inside = (times >= begin) & (times <= end)
-        columns[:, inside] = piece.sol(times[inside])
-        state = piece.y[:, -1]
-    return columns
+    return monolith.pieces(derivatives, np.zeros(5), times, kinks=[0.5, 2.5], tolerance=1e-10, scale=0.1)
 
 
 def errors(h, mu=0.5):

@@ -16,7 +16,7 @@ from yawbench.components.tyres.magic_formula import MagicFormula
 from yawbench.components.tyres.magic_formula_1987 import MagicFormula1987
 
 from . import monolith, monolith_b
-from .loop import Loop
+from .loop import drive_on
 from .magic import forces_and_moment
 from .stand import four
 
@@ -47,12 +47,8 @@ def drive(
     """Return the recorded signals (rows); tyres find their wires by name, as in a scenario."""
     sine = {"amplitude": steer, "frequency": 0.4, "start_time": 0.2}
     limited = {"limited": True} if tyre is LinearTyre else {}
-    loop = Loop(
-        [(Sine, sine), (plant, {"initial_speed": speed}), (tyre, limited)],
-        algorithm=algorithm,
-        constants={**four("friction", mu), **four("wheel_torque", *torque)},
-    )
-    return np.array(loop.run(until, round(until / h), lambda now: [now[name] for name in record])).T
+    units = [(Sine, sine), (plant, {"initial_speed": speed}), (tyre, limited)]
+    return drive_on(units, until=until, h=h, record=record, mu=mu, torque=torque, algorithm=algorithm)
 
 
 PLANTS = [SevenDof, EightDof, FourteenDof]
