@@ -298,41 +298,24 @@ def within(v, x: float) -> bool:
 
 
 @every
-def test_parameters_arrive_after_the_instance_is_made(component):
+def test_parameters_arrive_after_the_instance_is_made_and_outputs_read_before_do_not_bind(component):
     declared = parameters_of(component)
-    stand = Stand(component)
-    changed = {
-        v.name: next(x for x in (1.01 * v.start, 0.99 * v.start) if within(v, x))
-        for v in component.variables
-        if v.causality == "parameter" and v.type == "Real"
-    }
-    for name, value in declared.items():
-        assert stand[name] == value
-    stand.start(**some_inputs(component, 0))
-    late = Stand(component)
-    late.start(**some_inputs(component, 0))  # outputs read before the parameters are set do not bind
-    fresh = Stand(component, **changed)
-    assert {name: getattr(late.unit.p, name) for name in declared} == declared
-    fresh.start(**some_inputs(component, 0))
-    assert {name: getattr(fresh.unit.p, name) for name in declared} == declared | changed
-
-
-@every
-def test_outputs_read_before_parameters_are_set_do_not_bind(component):
     changed = {
         v.name: next((x for x in (1.01 * v.start, 0.99 * v.start) if within(v, x)), v.start)
         for v in component.variables
         if v.causality == "parameter" and v.type == "Real"
     }
-    stands = Stand(component), Stand(component, **changed)
-    stands[0].set(**some_inputs(component, 0))
-    stands[0].outputs()
-    stands[0].set(**changed)
-    for stand in stands:
+    late, fresh = Stand(component), Stand(component, **changed)
+    assert {name: late[name] for name in declared} == declared
+    late.set(**some_inputs(component, 0))
+    late.outputs()
+    late.set(**changed)
+    for stand in (late, fresh):
         stand.start(**some_inputs(component, 0))
+        assert {name: getattr(stand.unit.p, name) for name in declared} == declared | changed
         for k in (1, 2):
             stand.step(0.001, **some_inputs(component, k))
-    assert [*map(repr, stands[0].outputs().values())] == [*map(repr, stands[1].outputs().values())]
+    assert [*map(repr, late.outputs().values())] == [*map(repr, fresh.outputs().values())]
 
 
 def test_what_units_know_of_a_car_has_the_measure_of_the_vocabulary():

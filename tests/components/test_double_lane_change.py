@@ -36,13 +36,6 @@ def test_the_path_runs_along_the_middles_but_in_lane_three_and_is_level_where_la
     assert track.path(0.5 * (first.end + second.start)) == pytest.approx(1.75)
 
 
-def test_a_negative_offset_mirrors_the_track():
-    left, right = (Track(LaneChangeParameters(lane_offset=side * 3.5)) for side in (1.0, -1.0))
-    for x in range(0, 180, 7):
-        assert right.path(x) == -left.path(x)
-        assert right.overrun(x, -1.0, -0.05) == left.overrun(x, 1.0, 0.05)
-
-
 def test_overrun_is_what_sticks_out_of_the_lane():
     track = Track(LaneChangeParameters())
     lane = track.lanes[0]

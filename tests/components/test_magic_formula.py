@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import random
+from itertools import cycle
 from math import atan, cos, degrees, exp, hypot, isfinite, pi, radians, sin, sqrt, tan
 
 import pytest
@@ -134,7 +135,7 @@ ODD = [
 
 @pytest.mark.parametrize("asymmetric", [True, False])
 def test_forces_and_moment_are_those_of_the_printed_equations_for_any_complete_set(asymmetric):
-    draw = random.Random(1)
+    draw, axles = random.Random(1), cycle(("front", "rear"))
     plain = MagicFormulaParameters()
     unlisted = {"PEX4": 0.1, "PVX1": 0.01, "PVX2": -0.02, "REX1": -0.3, "REX2": 0.1, "REY1": 0.2}
     unlisted |= {"REY2": -0.1, "RHY2": 0.01, "QBZ10": 0.4, "QEZ3": -0.1, "QDZ7": 0.003}
@@ -144,32 +145,19 @@ def test_forces_and_moment_are_those_of_the_printed_equations_for_any_complete_s
         given = {name: unlisted.get(name, getattr(plain, name)) * draw.uniform(0.8, 1.2) for name in names}
         given |= {"friction_scale_x": draw.uniform(0.8, 1.2), "friction_scale_y": draw.uniform(0.8, 1.2)}
         given |= {"asymmetric_terms": asymmetric, "low_friction": "scale"}
+        axle, k_y, k_x = next(axles), draw.uniform(0.6, 1.2), draw.uniform(0.8, 1.2)
+        given |= {f"cornering_stiffness_scale_{axle}": k_y, f"slip_stiffness_scale_{axle}": k_x}
         p = MagicFormulaParameters(reference_friction=0.9, **given)
         printed = p if asymmetric else dataclasses.replace(p, **dict.fromkeys(ODD, 0.0))
         kappa, alpha = draw.uniform(-0.9, 0.3), draw.uniform(-0.4, 0.4)
         f_z, mu = draw.uniform(300.0, 9000.0), draw.uniform(0.5, 1.2)
-        expected = book(kappa, alpha, f_z, mu / 0.9, printed)
-        found = forces_and_moment(interface_slip(kappa), alpha, f_z, mu, coefficients(p, "front"))
+        expected = book(kappa, alpha, f_z, mu / 0.9, printed, k_y, k_x)
+        found = forces_and_moment(interface_slip(kappa), alpha, f_z, mu, coefficients(p, axle))
         assert found == pytest.approx(expected, rel=1e-9, abs=1e-7)
         worst = max(worst, *(abs(a - b) / f_z for a, b in zip(found[:2], expected[:2], strict=True)))
     terms = "with" if asymmetric else "without"
     printed = "the book's printed equations, forces as a share of the load"
     measured("tyres", f"tyre_magic_formula, {terms} asymmetric terms", printed, worst, at_most=1e-9)
-
-
-def test_axle_scalings_scale_the_stiffnesses_of_their_axle_and_the_slope_of_its_trail():
-    p = MagicFormulaParameters(
-        cornering_stiffness_scale_front=0.611,
-        cornering_stiffness_scale_rear=1.169,
-        slip_stiffness_scale_front=0.9,
-        slip_stiffness_scale_rear=1.1,
-    )
-    plain = dataclasses.replace(
-        p, **{n: 1.0 for n in vars(p) if n.endswith(("scale_front", "scale_rear"))}, **dict.fromkeys(ODD, 0.0)
-    )
-    for axle, k_y, k_x in (("front", 0.611, 0.9), ("rear", 1.169, 1.1)):
-        found = forces_and_moment(-0.03, 0.05, 5000.0, 1.0, coefficients(p, axle))
-        assert found == pytest.approx(book(-0.03, 0.05, 5000.0, 1.0, plain, k_y, k_x), rel=1e-12)
 
 
 def test_similarity_scales_forces_and_slips_together():

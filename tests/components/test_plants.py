@@ -12,7 +12,7 @@ from yawbench.components.plants.fourteen_dof import FourteenDof
 from yawbench.components.plants.seven_dof import SevenDof
 from yawbench.components.plants.two_dof import TwoDof
 from yawbench.vocabulary.gravity import G
-from yawbench.vocabulary.wheels import WHEELS
+from yawbench.vocabulary.wheels import WHEELS, wheels
 
 from .stand import Stand, wheel_values
 
@@ -89,3 +89,17 @@ def test_without_forces_a_spinning_car_keeps_speed_spin_and_course(plant):
     if plant is not FourteenDof:  # the wheels' spin turns its body
         assert (psi, y["yaw_rate"]) == pytest.approx((2.0 * r, r), rel=1e-12)
         assert y["sideslip_rate"] == pytest.approx(-r, rel=1e-9)  # the course stays, the car turns
+
+
+@every
+def test_moments_of_the_tyres_turn_the_car_and_do_nothing_else_at_first(plant):
+    """Held for a millisecond on a car that rolls straight on; without them nothing turns it."""
+    turned = {}
+    for moment in (0.0, 30.0):
+        stand = Stand(plant)
+        stand.start()
+        y = stand.step(0.001, **dict.fromkeys(wheels("tyre_moment_z_*"), moment))
+        turned[moment] = y["yaw_rate"], y["velocity_x"]
+    assert turned[0.0][0] == 0.0
+    assert turned[30.0][0] == pytest.approx(0.001 * 4 * 30.0 / stand.unit.p.yaw_inertia, rel=0.01)
+    assert turned[30.0][1] == pytest.approx(turned[0.0][1], rel=1e-9)

@@ -45,15 +45,23 @@ def torque_of(request, kappa=0.0, *, w, v, dv=0.0, f_z=4000.0, mu=0.8, h=0.001, 
     return wheel_torque(request, kappa, curve, w=w, v=v, dv=dv, sample_time=h, p=p)[0]
 
 
-def test_without_a_request_the_wheel_rolls_free():
-    for kappa, v in ((0.0, 20.0), (-0.01, 20.0), (0.02, 20.0), (0.0, 0.0)):
-        assert torque_of(0.0, kappa, w=v / 0.313, v=v, dv=-3.0) == 0.0
+R = 0.313
 
 
-def test_a_small_request_and_a_slow_wheel_get_force_times_radius():
-    assert torque_of(-50.0, -0.03, w=60.0, v=20.0) == pytest.approx(-50.0 * 0.313, rel=1e-4)
-    assert torque_of(-900.0, -0.03, w=2.0, v=1.0) == pytest.approx(-900.0 * 0.313, rel=1e-4)
-    assert torque_of(900.0, 0.0, w=0.0, v=0.0) == pytest.approx(900.0 * 0.313, rel=1e-4)
+@pytest.mark.parametrize(
+    ("request_", "kappa", "w", "v", "torque"),
+    [
+        *((0.0, kappa, v / R, v, 0.0) for kappa, v in ((0.0, 20.0), (-0.01, 20.0), (0.02, 20.0), (0.0, 0.0))),
+        (-50.0, -0.03, 60.0, 20.0, -50.0 * R),
+        (-900.0, -0.03, 2.0, 1.0, -900.0 * R),  # a slow wheel
+        (900.0, 0.0, 0.0, 0.0, 900.0 * R),
+        (-2000.0, 0.0, 0.0, 0.0, 0.0),  # nothing drives the car backwards
+        *((-2000.0, k, v / R, v, 0.0) for k, v in ((0.0, -5.0), (-0.2, -5.0), (0.3, -5.0), (0.0, -0.5))),
+    ],
+)
+def test_small_requests_and_slow_wheels_get_force_times_radius_and_others_none(request_, kappa, w, v, torque):
+    dv = 0.0 if request_ else -3.0
+    assert torque_of(request_, kappa, w=w, v=v, dv=dv) == pytest.approx(torque, rel=1e-4)
 
 
 def test_the_fades_leave_no_jump():
@@ -71,15 +79,6 @@ def test_a_braked_wheel_gets_no_torque_that_would_reverse_it():
         if torque < 0.0:
             force, _ = tyre_curve(0.0, 4000.0, 0.8)
             assert w + 0.002 * (torque - 0.313 * force(kappa)) / 2.1 >= -1e-12
-
-
-def test_a_car_at_rest_that_is_asked_to_brake_gets_no_torque():
-    assert torque_of(-2000.0, 0.0, w=0.0, v=0.0) == 0.0
-
-
-def test_nothing_drives_the_car_backwards():
-    for kappa, v in ((0.0, -5.0), (-0.2, -5.0), (0.3, -5.0), (0.0, -0.5)):
-        assert torque_of(-2000.0, kappa, w=v / 0.313, v=v) == 0.0
 
 
 def test_a_car_that_rolls_backwards_is_held_by_a_forward_request():
