@@ -206,25 +206,6 @@ def test_a_braked_wheel_follows_its_equations_however_long_the_step_is():
     assert np.max(np.abs(coarse - fine)) < 0.02 * np.max(np.abs(fine - rolled_only))
 
 
-def test_a_car_runs_straight_and_lags_in_its_first_turn():
-    loop, _ = driven(SevenDof, 1.0, 1000)
-    assert abs(loop["position_y"]) < 1e-9
-    rates = {}
-    for tyre in (MagicFormula62, MagicFormula62Transient):
-        frictions = dict.fromkeys(wheels("friction_*"), 1.0)
-        parameters = {"wheel_radius": RADIUS} if tyre is MagicFormula62Transient else {}
-        units = [(SevenDof, {"wheel_radius": RADIUS}), (tyre, parameters)]
-        loop = Loop(units, algorithm="extrapolated", constants=frictions)
-        loop.constants["steer_angle"] = 0.02
-        loop.run(0.04, 40, lambda _: None)
-        early = loop["yaw_rate"]
-        loop.run(2.0, 2000, lambda _: None)
-        rates[tyre] = early, loop["yaw_rate"]
-    (early, steady), (early_lagging, steady_lagging) = rates.values()
-    assert early_lagging < 0.8 * early
-    assert steady_lagging == pytest.approx(steady, rel=1e-3)
-
-
 def test_the_coupling_with_the_car_is_of_second_order_in_the_step():
     """Loads move from side to side while the car turns in, and relaxation lengths with them."""
     rates = []
