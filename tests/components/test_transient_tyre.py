@@ -44,7 +44,7 @@ def stand(**parameters):
     return Stand(MagicFormula62Transient, wheel_radius=RADIUS, low_speed=LOW, **parameters)
 
 
-@pytest.mark.parametrize("steps", [1, 2, 7, 100])
+@pytest.mark.parametrize("steps", [1, 7])
 @pytest.mark.parametrize(("v", "kappa", "alpha"), [(20.0, 0.0, 0.05), (3.0, 0.0, -0.2), (20.0, -0.06, 0.0)])
 def test_after_the_relaxation_length_a_step_has_come_to_1_less_1_over_e(v, kappa, alpha, steps):
     tyre = stand()

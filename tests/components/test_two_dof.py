@@ -87,21 +87,6 @@ def test_longitudinal_tyre_forces_do_nothing():
     assert one.step(0.01, **four("tyre_force_x", -900.0)) == other.step(0.01)
 
 
-def test_a_circle_is_driven_as_a_circle():
-    r = 0.5
-    stand = Stand(TwoDof, initial_yaw_rate=r)
-    centripetal = four("tyre_force_y", *[0.5 * M * SPEED * r * x / L for x in (B, B, A, A)])
-    stand.start(**centripetal)
-    for _ in range(400):
-        y = stand.step(0.01)
-    assert y["velocity_y"] == pytest.approx(0.0, abs=1e-9)
-    radius = SPEED / r
-    assert y["position_x"] == pytest.approx(radius * sin(2.0), rel=1e-8)
-    assert y["position_y"] == pytest.approx(radius * (1 - cos(2.0)), rel=1e-8)
-    assert y["acceleration_y"] == pytest.approx(SPEED * r)
-    assert y["sideslip_rate"] == pytest.approx(0.0, abs=1e-12)
-
-
 def test_wheel_loads_carry_the_moment_of_the_lateral_acceleration_and_no_more():
     stand = Stand(TwoDof)
     y = stand.start(**four("tyre_force_y", 1000.0, 1200.0, 900.0, 1100.0))
