@@ -168,7 +168,7 @@ def flawless(component: type[Component]) -> dict[str, object]:
     return {name: 0.0 for name in parameters_of(component) if name.endswith(FLAWS)}
 
 
-def driven(component: type[Component], steps: int = 40, **parameters: object) -> Stand:
+def driven(component: type[Component], steps: int = 60, **parameters: object) -> Stand:
     """Return a stand that has been driven for some steps."""
     stand = Stand(component, **parameters)
     stand.start(**some_inputs(component, 0))

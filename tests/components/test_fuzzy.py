@@ -108,11 +108,7 @@ def sample(system: Mamdani, n: int, *, beyond: float = 0.0, seed: int = 1) -> li
 @pytest.mark.filterwarnings("ignore:Passing more than 2 positional:DeprecationWarning")  # in scikit-fuzzy
 @pytest.mark.parametrize(
     "make",
-    [
-        pytest.param(standard_seven, marks=pytest.mark.exhaustive),
-        paper_b,
-        uneven,
-    ],  # with 49 rules it takes long
+    [*(pytest.param(large, marks=pytest.mark.exhaustive) for large in (standard_seven, paper_b)), uneven],
 )
 def test_surface_agrees_with_scikit_fuzzy(make):
     system = make()

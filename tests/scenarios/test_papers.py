@@ -28,18 +28,18 @@ from yawbench.studies.load_experiment import load_experiment
 from yawbench.vocabulary.gravity import G
 
 ROADS_OF_C = ("double_lane_change", "sine", "ramp")
-ROADS_OF_B = ("high_friction", "low_friction", "beyond_paper")
+ROADS_OF_B = ("high_friction", "low_friction")
 SOME = {
     "A": (21, ["15mps/*", "25mps/*", "40mps/*", "complete_rule/*"]),
     "B": (
-        15,
+        9,
         [
             *(f"{road}/{law}" for road in ROADS_OF_B for law in ("off", "sign", "saturation", "fuzzy")),
-            *("sliding/weight_-0.25", "sliding/weight_0.25", "grip/6000_0.03/*"),
-            *("desired_speed/low_friction/*", "rear_grip/0.285", "every_road/*/fuzzy"),
+            *("beyond_paper/off", "beyond_paper/fuzzy", "sliding/weight_0.25", "grip/6000_0.03/*"),
+            *("rear_grip/0.285", "every_road/0.5/fuzzy"),
         ],
     ),
-    "C": (15, [f"{road}/{law}" for road in ROADS_OF_C for law in ("off", "pid", "fuzzy_pid")]),
+    "C": (8, [f"{road}/{law}" for road in ROADS_OF_C[:2] for law in ("off", "pid", "fuzzy_pid")]),
     "D": (
         10,
         ["off", "both", "yaw_rate_alone", "sideslip_alone", "linear_tyre/off", "unlimited/fuzzy_feedback"],
@@ -66,7 +66,7 @@ def test_the_runs_come_to_the_numbers_and_verdicts_that_the_docs_are_made_of(mad
 
 
 def test_the_brakes_of_paper_c_stay_within_their_limits(made):
-    for road in ROADS_OF_C:
+    for road in ROADS_OF_C[:2]:
         results = load_results(made("C")["folder"] / road / "fuzzy_pid")
         pressures = np.array([results[f"wheel_control.brake_pressure_{w}"] for w in ("fl", "fr", "rl", "rr")])
         assert pressures.min() >= 0.0
