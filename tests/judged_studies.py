@@ -46,15 +46,9 @@ def record_of(out: Path) -> dict[str, Any]:
     return json.loads((out / RECORD).read_text(encoding="utf-8")) | {"folder": out}
 
 
-def verdicts(study: dict[str, Any]) -> dict[str, str]:
-    """Return claim or check -> verdict, of those that are judged."""
-    every = [*study["claims"], *study["checks"]]
-    return {one["says"]: one["verdict"] for one in every if one["holds"] is not None}
-
-
 def check_figures(study: dict[str, Any], *names: str) -> None:
-    """Assert that a study has drawn these figures and no others, as SVG and PNG."""
-    assert set(study["figures"]) == set(names)
+    """Assert that a study has drawn these figures, as SVG and PNG."""
+    assert set(study["figures"]) >= set(names)
     for name in names:
         for kind in ("svg", "png"):
             assert (study["folder"] / "figures" / f"{name}.{kind}").stat().st_size > 10_000

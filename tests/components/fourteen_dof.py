@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from yawbench.components.cars.sprung_car import FourteenDofParameters, ride_of
 from yawbench.components.drivers.sine import Sine
 from yawbench.components.plants.fourteen_dof import FourteenDof
 from yawbench.components.tyres.magic_formula import MagicFormula
 
-from .loop import Loop
+from .loop import drive_on
 from .stand import four
 
 P = FourteenDofParameters()
@@ -46,11 +44,7 @@ def drive(
     **parameters,
 ):
     """Return the recorded signals (rows) of driver, car and tyre in a loop."""
-    tyres = SCALES if tyre is MagicFormula else {}
     sine = {"amplitude": steer, "frequency": frequency, "start_time": 0.5}
-    loop = Loop(
-        [(Sine, sine), (plant, {"initial_speed": SPEED} | parameters), (tyre, tyres)],
-        algorithm="extrapolated",
-        constants={**four("friction", mu), **four("wheel_torque", *torque)},
-    )
-    return np.array(loop.run(until, round(until / h), lambda now: [now[name] for name in record])).T
+    car, tyres = {"initial_speed": SPEED} | parameters, SCALES if tyre is MagicFormula else {}
+    units = [(Sine, sine), (plant, car), (tyre, tyres)]
+    return drive_on(units, mu=mu, until=until, h=h, record=record, torque=torque)

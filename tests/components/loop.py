@@ -10,8 +10,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from yawbench.components.fmi.component import Component
 from yawbench.components.fmi.variables import output, parameter
+
+from .stand import four
 
 
 class Straight(Component):
@@ -145,8 +149,28 @@ class Loop:
             results.append(each(self))
         return results
 
+    def rows(self, until: float, h: float, names: Sequence[str]) -> np.ndarray:
+        """Return signals (rows) at every multiple of `h` [s], from the start on."""
+        return np.array(self.run(until, round(until / h), lambda now: [now[name] for name in names])).T
+
     @staticmethod
     def _check(unit: Unit) -> None:
         messages = [m.msg for m in unit.slave.log_queue if m.status >= 3]
         if messages:
             raise AssertionError("\n".join(messages))
+
+
+def drive_on(
+    units: Sequence[tuple[type[Component], dict[str, Any]]],
+    *,
+    until: float,
+    record: Sequence[str],
+    h: float = 1e-3,
+    mu: float = 1.0,
+    torque: Sequence[float] = (0.0,),
+    algorithm: str = "extrapolated",
+    **constants: float,
+) -> np.ndarray:
+    """Return the recorded signals (rows) of units on a road of friction `mu` under a torque at each wheel."""
+    given = {**four("friction", mu), **four("wheel_torque", *torque), **constants}
+    return Loop(units, algorithm=algorithm, constants=given).rows(until, h, record)

@@ -28,6 +28,34 @@ def sine(amplitude: float, frequency: float, start: float, periods: float) -> Ca
     return steer
 
 
+def pieces(
+    derivatives: Callable[[float, np.ndarray], Sequence[float] | np.ndarray],
+    state: Sequence[float] | np.ndarray,
+    times: np.ndarray,
+    *,
+    kinks: Sequence[float] = (),
+    tolerance: float,
+    scale: np.ndarray | float = 1.0,
+) -> np.ndarray:
+    """Return the states (rows) at `times` (columns) of a system that is smooth but at `kinks`."""
+    columns = np.empty((len(state), len(times)))
+    edges = [times[0], *sorted(k for k in kinks if times[0] < k < times[-1]), times[-1]]
+    for span in pairwise(edges):
+        piece = solve_ivp(
+            derivatives,
+            span,
+            state,
+            method="DOP853",
+            rtol=tolerance,
+            atol=tolerance * scale,
+            dense_output=True,
+        )
+        inside = (times >= span[0]) & (times <= span[1])
+        columns[:, inside] = piece.sol(times[inside])
+        state = piece.y[:, -1]
+    return columns
+
+
 def tyre(alpha: float, kappa: float, load: float, mu: float) -> tuple[float, float]:
     root = sqrt((C_X * kappa) ** 2 + (C_Y * tan(alpha)) ** 2)
     if load <= 0.0 or root == 0.0:
@@ -96,20 +124,5 @@ def solve(
         return [a_x + v_y * r, a_y - v_x * r, turn, *moved, *spun]
 
     state = np.array([speed, 0.0, 0.0, 0.0, 0.0, 0.0, *[speed / R] * 4])
-    columns = np.empty((10, len(times)))
-    edges = [times[0], *sorted(k for k in kinks if times[0] < k < times[-1]), times[-1]]
     scale = np.array([1.0, 0.1, 0.01, 1.0, 1.0, 0.01, 10.0, 10.0, 10.0, 10.0])
-    for begin, end in pairwise(edges):
-        piece = solve_ivp(
-            derivatives,
-            (begin, end),
-            state,
-            method="DOP853",
-            rtol=tolerance,
-            atol=tolerance * scale,
-            dense_output=True,
-        )
-        inside = (times >= begin) & (times <= end)
-        columns[:, inside] = piece.sol(times[inside])
-        state = piece.y[:, -1]
-    return columns
+    return pieces(derivatives, state, times, kinks=kinks, tolerance=tolerance, scale=scale)

@@ -8,11 +8,11 @@ of four equations, the loop load -> force -> load solved at every instant.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from itertools import pairwise
 from math import atan2, copysign, cos, sin
 
 import numpy as np
-from scipy.integrate import solve_ivp
+
+from .monolith import pieces
 
 M, M_S, I_Z, I_X, A, B, D, H, H_S = 1350.0, 1110.0, 1343.1, 440.6, 1.04, 1.56, 1.48, 0.54, 0.4
 K, C, FRONT, H_F, H_R = 56000.0, 2600.0, 0.55, 0.14, 0.14
@@ -120,20 +120,5 @@ def solve(
         return [dv_x, dv_y, dr, *moved, dphi, ddphi, *spun]
 
     state = np.array([speed, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, *[speed / R] * 4])
-    columns = np.empty((12, len(times)))
-    edges = [times[0], *sorted(k for k in kinks if times[0] < k < times[-1]), times[-1]]
     scale = np.array([1.0, 0.1, 0.01, 1.0, 1.0, 0.01, 0.01, 0.1, 10.0, 10.0, 10.0, 10.0])
-    for begin, end in pairwise(edges):
-        piece = solve_ivp(
-            derivatives,
-            (begin, end),
-            state,
-            method="DOP853",
-            rtol=tolerance,
-            atol=tolerance * scale,
-            dense_output=True,
-        )
-        inside = (times >= begin) & (times <= end)
-        columns[:, inside] = piece.sol(times[inside])
-        state = piece.y[:, -1]
-    return columns
+    return pieces(derivatives, state, times, kinks=kinks, tolerance=tolerance, scale=scale)

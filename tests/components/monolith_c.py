@@ -10,11 +10,11 @@ Velocities w: v_x, v_y, r, dz, dphi, dtheta, du_fl, du_fr, du_rl, du_rr. Coordin
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from itertools import pairwise
 from math import atan2, cos, sin
 
 import numpy as np
-from scipy.integrate import solve_ivp
+
+from .monolith import pieces
 
 M, M_S, I_Z, I_XS, I_YS, A, B, D, H, H_U = 1830.0, 1650.0, 3234.0, 928.0, 2790.0, 1.4, 1.65, 1.6, 0.5093, 0.32
 SPRINGS, DAMPERS, BARS, CENTRES = (34e3, 32e3), (3000.0, 2800.0), (14e3, 6e3), (0.06, 0.11)
@@ -172,20 +172,5 @@ def solve(
 
     state = np.zeros(26)
     state[10], state[20:24] = speed, speed / R
-    columns = np.empty((24, len(times)))
-    edges = [times[0], *sorted(k for k in kinks if times[0] < k < times[-1]), times[-1]]
     scale = np.array([1, 1, 0.01, *[0.01] * 7, 1, 0.1, 0.01, *[0.1] * 7, *[10.0] * 4, 1e3, 1e3])
-    for begin, end in pairwise(edges):
-        piece = solve_ivp(
-            derivatives,
-            (begin, end),
-            state,
-            method="DOP853",
-            rtol=tolerance,
-            atol=tolerance * scale,
-            dense_output=True,
-        )
-        inside = (times >= begin) & (times <= end)
-        columns[:, inside] = piece.sol(times[inside])[:24]
-        state = piece.y[:, -1]
-    return columns
+    return pieces(derivatives, state, times, kinks=kinks, tolerance=tolerance, scale=scale)[:24]

@@ -16,7 +16,7 @@ from yawbench.components.control_laws.predictive_law import CostWeights, Predict
 from yawbench.components.control_laws.sideslip_bound import sideslip_bound
 from yawbench.components.controllers.dead_band import DeadBand
 from yawbench.components.controllers.mpc import Mpc
-from yawbench.components.mathematics.quadratic_program import inverse, multipliers
+from yawbench.components.mathematics.quadratic_program import multipliers
 
 from .stand import Stand
 
@@ -66,13 +66,6 @@ def test_multipliers_are_those_of_nonnegative_least_squares():
         lower = np.linalg.cholesky(p)
         exact, _ = nnls(lower.T, -np.linalg.solve(lower, d))
         assert np.allclose(multipliers(p.tolist(), d.tolist()), exact, rtol=1e-6, atol=1e-7)
-
-
-def test_an_inverse_is_one():
-    rng = np.random.default_rng(5)
-    root = rng.normal(size=(6, 6))
-    h = root @ root.T + np.eye(6)
-    assert np.allclose(inverse(h.tolist()) @ h, np.eye(6), atol=1e-10)
 
 
 @pytest.mark.parametrize("car", CARS.values(), ids=CARS)

@@ -7,7 +7,6 @@ import random
 import numpy as np
 import pytest
 
-from yawbench.components.cars.resistance import ResistanceParameters
 from yawbench.components.drivers.sine import Sine
 from yawbench.components.mathematics.carry import Carried, limited
 from yawbench.components.plants.eight_dof import EightDof
@@ -17,14 +16,9 @@ from yawbench.components.tyres.dugoff import Dugoff
 
 from .loop import Loop
 from .stand import Stand, four
+from .test_plants import free
 
 PLANTS = (SevenDof, EightDof, FourteenDof)
-
-
-def free(plant):
-    """Parameters that take rolling and air resistance off a plant that has them."""
-    resisting = issubclass(plant.Parameters, ResistanceParameters)
-    return {"drag_coefficient": 0.0, "rolling_resistance": 0.0} if resisting else {}
 
 
 @pytest.mark.parametrize("steps", [[0.001], [0.001, 0.004, 0.0005]])

@@ -36,13 +36,6 @@ def test_the_path_runs_along_the_middles_but_in_lane_three_and_is_level_where_la
     assert track.path(0.5 * (first.end + second.start)) == pytest.approx(1.75)
 
 
-def test_a_negative_offset_mirrors_the_track():
-    left, right = (Track(LaneChangeParameters(lane_offset=side * 3.5)) for side in (1.0, -1.0))
-    for x in range(0, 180, 7):
-        assert right.path(x) == -left.path(x)
-        assert right.overrun(x, -1.0, -0.05) == left.overrun(x, 1.0, 0.05)
-
-
 def test_overrun_is_what_sticks_out_of_the_lane():
     track = Track(LaneChangeParameters())
     lane = track.lanes[0]
@@ -98,9 +91,6 @@ def test_the_lanes_of_part_2_have_the_lengths_widths_and_gap_of_the_standard():
     assert lanes[1].right - lanes[0].left == pytest.approx(1.0)
     narrow = Track(LaneChangeParameters(vehicle_width=1.7, track_standard="iso_3888_2")).lanes[2]
     assert narrow.left - narrow.right == 3.0  # at least
-    mirrored = Track(LaneChangeParameters(track_standard="iso_3888_2", lane_offset=-0.1))
-    plain = Track(LaneChangeParameters(track_standard="iso_3888_2"))
-    assert [mirrored.path(x) for x in range(100)] == [-plain.path(x) for x in range(100)]
 
 
 def clipped(polygon, a, b, c):

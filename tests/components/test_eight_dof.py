@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from math import atan, cos, exp, pi, sin, sqrt, tan
+from math import atan, cos, sin, sqrt, tan
 
 import numpy as np
 import pytest
 
 from tests.evidence import measured
 from yawbench.components.cars.rolling_body import G, RollingCarParameters
-from yawbench.components.cars.wheel_spin import spin
 from yawbench.components.drivers.sine import Sine
 from yawbench.components.plants.eight_dof import EightDof
 from yawbench.components.tyre_models.pacejka_2002_set import MagicFormulaParameters, coefficients
@@ -17,7 +16,7 @@ from yawbench.components.tyres.dugoff import Dugoff
 from yawbench.components.tyres.magic_formula import MagicFormula
 
 from . import monolith, monolith_b
-from .loop import Loop
+from .loop import drive_on
 from .magic import forces_and_moment
 from .stand import Stand, four, wheel_values
 
@@ -35,12 +34,9 @@ def lateral(force: float) -> dict[str, float]:
 
 def drive(tyre, *, plant=EightDof, mu=0.8, steer=0.0, until=1.0, h=1e-3, record, torque=(0.0,), **parameters):
     """Return the recorded signals (rows) of a car driven through one loop of plant and tyre."""
-    loop = Loop(
-        [(Sine, {"amplitude": steer, "frequency": 0.4, "start_time": 0.2}), (plant, parameters), (tyre, {})],
-        algorithm="extrapolated",
-        constants={**four("friction", mu), **four("wheel_torque", *torque)},
-    )
-    return np.array(loop.run(until, round(until / h), lambda each: [each[name] for name in record])).T
+    sine = {"amplitude": steer, "frequency": 0.4, "start_time": 0.2}
+    units = [(Sine, sine), (plant, parameters), (tyre, {})]
+    return drive_on(units, mu=mu, until=until, h=h, record=record, torque=torque)
 
 
 def roll_energy(y: dict[str, float]) -> float:
@@ -81,30 +77,6 @@ def test_a_start_with_lateral_forces_is_in_roll_equilibrium():
     assert after["roll_rate"] == pytest.approx(0.0, abs=1e-12)
 
 
-def test_longitudinal_load_transfer_is_that_of_the_forces_at_the_height_of_the_centre_of_mass():
-    stand = Stand(EightDof)
-    y = stand.start(**four("tyre_force_x", -1000.0, -1000.0, -500.0, -500.0))
-    front = P.mass * G * 1.56 / 2.6 + 0.54 * 3000.0 / 2.6
-    assert y["vertical_load_fl"] == y["vertical_load_fr"] == pytest.approx(front / 2, rel=1e-12)
-    assert sum(wheel_values(y, "vertical_load")) == pytest.approx(P.mass * G, rel=1e-12)
-
-
-def test_roll_frequency_and_damping_match_the_closed_form():
-    inertia = P.roll_inertia - COUPLING**2 / P.mass  # the body is free to move sideways
-    natural = sqrt((P.roll_stiffness - COUPLING * G) / inertia)
-    ratio = P.roll_damping / (2 * inertia * natural)
-    assert natural / (2 * pi) == pytest.approx(2.107, abs=1e-3)
-    assert ratio == pytest.approx(0.333, abs=1e-3)
-    stand = Stand(EightDof, initial_speed=20.0, **FREE)
-    start = stand.start(**lateral(500.0))["roll_angle"]
-    rate = natural * sqrt(1 - ratio**2)
-    for _ in range(100):
-        y = stand.step(0.01, **lateral(0.0))
-        t = stand.time
-        phase = cos(rate * t) + ratio / sqrt(1 - ratio**2) * sin(rate * t)
-        assert y["roll_angle"] == pytest.approx(start * exp(-ratio * natural * t) * phase, abs=2e-5 * start)
-
-
 @pytest.mark.parametrize("damping", [2600.0, 0.0])
 @pytest.mark.sampled(1)
 def test_rolling_conserves_lateral_momentum_and_loses_energy_only_to_the_dampers(damping):
@@ -132,15 +104,6 @@ def test_coasting_down_matches_the_closed_form_of_drag_and_rolling_resistance():
     terminal, rate = sqrt(rolling / drag), sqrt(rolling * drag) / mass
     # Wheels that are first taken to their slip push the car: 5e-5 of its speed.
     assert speed[-1] == pytest.approx(terminal * tan(atan(30.0 / terminal) - rate * 10.0), rel=1e-4)
-
-
-def test_torque_against_the_rolling_resistance_keeps_the_car_rolling_without_slip():
-    front, rear = (P.rolling_resistance * 0.313 * 0.5 * P.mass * G * arm / 2.6 for arm in (1.56, 1.04))
-    names = ["velocity_x", *four("slip_ratio", 0.0)]
-    torque = (front, front, rear, rear)
-    speed, *slips = drive(Dugoff, record=names, torque=torque, initial_speed=25.0, drag_coefficient=0.0)
-    assert np.abs(speed - 25.0).max() < 1e-12
-    assert np.abs(slips).max() < 1e-14
 
 
 def test_the_excess_of_rotating_mass_slows_longitudinal_motion_alone():
@@ -225,68 +188,6 @@ def test_lifted_wheels_carry_nothing_and_the_others_carry_the_car():
     y = stand.step(1e-3, **lateral(0.0), **four("tyre_force_x", -20000.0))
     assert y["vertical_load_rl"] == y["vertical_load_rr"] == 0.0
     assert y["vertical_load_fl"] + y["vertical_load_fr"] == pytest.approx(P.mass * G, rel=1e-12)
-
-
-def test_a_car_on_two_wheels_does_not_blow_up():
-    names = ["yaw_rate", "sideslip", "roll_angle", "velocity_x", *four("vertical_load", 0.0)]
-    run = drive(
-        MagicFormula,
-        mu=1.2,
-        steer=0.2,
-        until=4.0,
-        h=2e-3,
-        record=names,
-        initial_speed=25.0,
-        roll_centre_height_front=0.6,
-        roll_centre_height_rear=0.6,
-    )
-    assert run[4:].min() == 0.0
-    assert np.all(np.isfinite(run))
-    assert np.abs(run[2]).max() < 0.3
-    assert np.hypot(run[3], run[3] * np.tan(run[1])).max() < 26.0
-
-
-def test_a_braked_wheel_locks_stays_locked_and_spins_up_again():
-    stand = Stand(EightDof, initial_speed=20.0, rolling_resistance=0.0)
-    y = stand.start()
-    for _ in range(300):
-        y = stand.step(1e-3, **four("wheel_torque", -2000.0), **four("tyre_force_x", -3000.0))
-        assert y["wheel_speed_fl"] >= 0.0
-    assert y["wheel_speed_fl"] == 0.0
-    assert y["slip_ratio_fl"] == -1.0
-    y = stand.step(1e-3, **four("wheel_torque", -900.0))  # less than the tyre's 939 N.m
-    assert y["wheel_speed_fl"] == pytest.approx(1e-3 * 39.0 / 2.1, rel=1e-9)
-    for _ in range(20):
-        y = stand.step(1e-3, **four("wheel_torque", 0.0))
-    assert y["wheel_speed_fl"] > 8.0
-
-
-def test_a_slow_wheel_settles_at_the_slip_of_the_whole_equation():
-    # Braking at walking pace, where a held force would swing up: C R^2 h / (J v) = 4.
-    stiffness, torque, v, deceleration, h = 80000.0, -600.0, 1.0, 5.0, 1e-3
-    w, f_x, kappa = v / 0.313, 0.0, 0.0
-    before = 0.0
-    for _ in range(60):
-        v_end = v - deceleration * h
-        w = spin(
-            w,
-            h,
-            torque=torque,
-            resistance=0.0,
-            f_x=1.5 * f_x - 0.5 * before,
-            v=v,
-            v_end=v_end,
-            radius=0.313,
-            inertia=2.1,
-            stiffness=stiffness,
-            v_low=0.5,
-        )
-        v = v_end
-        kappa = (0.313 * w - v) / v
-        before, f_x = f_x, stiffness * kappa
-    # J dw/dt = T - F R with dw/dt = (1 + kappa) dv/dt / R
-    balance = torque + 2.1 * deceleration * (1 + kappa) / 0.313
-    assert f_x * 0.313 == pytest.approx(balance, rel=1e-9)
 
 
 def test_springs_that_cannot_hold_the_body_are_refused():

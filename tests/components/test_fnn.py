@@ -69,23 +69,6 @@ def test_output_is_that_of_the_equations_written_out_rule_by_rule(seed):
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_gradient_of_the_weights_agrees_with_finite_differences(seed):
-    x, weights, centres, widths = any_network(seed)
-    gradient = firing_strengths(*map(normalised_grades, x, centres, widths))
-    step = 1e-4
-    differences = [
-        (
-            rule_by_rule(x, moved(weights, [k], step), centres, widths)
-            - rule_by_rule(x, moved(weights, [k], -step), centres, widths)
-        )
-        / (2.0 * step)
-        for k in range(49)
-    ]
-    assert np.max(np.abs(np.subtract(gradient, differences))) < 1e-6
-    assert sum(gradient) == pytest.approx(1.0, abs=1e-14)
-
-
-@pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize("which", ["centres", "widths"])
 def test_gradient_of_the_sets_agrees_with_finite_differences(seed, which):
     x, weights, centres, widths = any_network(seed)

@@ -152,15 +152,6 @@ def test_the_sampled_super_twisting_solves_the_implicit_equation():
         assert law.integral - w == pytest.approx(np.clip(s / (h * h * k_2), -1, 1) * h * k_2)
 
 
-def test_errors_of_the_sampled_super_twisting_decay_within_two_samples():
-    h, law = 0.005, SuperTwisting(6.7, 22.0)
-    law.integral, s, d = 2.0, 1e-4, 2.05
-    for _ in range(2):
-        s += h * (d - law.see(s, h, -math.inf, math.inf))
-    assert s == pytest.approx(0.0, abs=1e-15)
-    assert law.integral == pytest.approx(d)
-
-
 def test_beyond_the_limit_the_integral_only_moves_back():
     law = SuperTwisting(5.0, 20.0)
     for _ in range(100):

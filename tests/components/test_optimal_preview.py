@@ -133,14 +133,6 @@ def test_a_slow_car_has_the_margin_all_along_and_a_fast_one_less_force_for_less_
     assert fast[1] < 0.95 * 0.9 * G
 
 
-def test_a_mirrored_track_has_the_mirrored_path_and_no_offset_none():
-    left, right, none = (planned(P(lane_offset=offset)) for offset in (3.5, -3.5, 0.0))
-    for x in range(10, 180, 5):
-        assert right(x) == pytest.approx(-left(x), abs=1e-9)
-        assert none(x) == 0.0
-    assert left(80.0) > 3.0
-
-
 def on_the_move(**motion):
     zero = dict.fromkeys(("velocity_y", "yaw_rate", "position_x", "position_y", "yaw_angle"), 0.0)
     return {"velocity_x": 20.0, **zero, **motion}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from math import cos, pi, sin, sqrt
+from math import cos, sin
 
 import numpy as np
 import pytest
@@ -68,52 +68,6 @@ def test_energy_changes_by_the_power_of_the_forces_at_the_contact_points_less_th
     travel_rates = monolith_c.TRAVEL @ np.concatenate([[v_x, v_y, r], y[7:]])
     lost = np.dot(np.repeat([P.damping_front, P.damping_rear], 2), travel_rates**2)
     assert (ahead - behind) / (2 * step) + moving == pytest.approx(power - lost, rel=1e-7)
-
-
-@pytest.mark.parametrize("height, tolerance", [(0.01, 1e-6), (0.05, 3e-4)])
-def test_the_undamped_body_keeps_its_energy_also_with_wheels_that_leave_the_road(height, tolerance):
-    ride = RIDE._replace(d_f=0.0, d_r=0.0)
-    state = [1.0, height, 2.0 * height, height, *[0.5 * height] * 4, *[0.0] * 7]
-    first = energy(ride, state[0], state[1:])
-    spinning = 0.5 * P.yaw_inertia  # what the ride cannot lose
-    lifted = 0
-    for _ in range(4000):
-        state = move_ride(state[0], state[1:], 5e-4, held=FREE, ride=ride, longest=LONGEST)
-        now = energy(ride, state[0], state[1:])
-        assert now - first == pytest.approx(0.0, abs=tolerance * (first - spinning))
-        lifted += min(loads(state[1:], ride)) == 0.0
-    assert (lifted > 100) == (height > 0.02)
-
-
-def test_a_roll_centre_at_the_centre_of_mass_leaves_nothing_to_the_springs():
-    # In a steady turn links carry all of it: the body does not roll, the wheels' loads still shift.
-    force = 3000.0
-    high = ride_of(
-        dataclasses.replace(P, roll_centre_height_front=P.cg_height, roll_centre_height_rear=P.cg_height)
-    )
-    share = B / (A + B)
-    f_y = [0.5 * force * share, 0.5 * force * share, 0.5 * force * (1 - share), 0.5 * force * (1 - share)]
-    state = (0.0, *AT_REST)
-    for _ in range(3000):
-        state = move_ride(
-            0.0, state[1:], 2e-3, held=pushed((0.0,) * 4, f_y), ride=high, longest=RESOLVED / high.fastest()
-        )
-    axle_roll = [(state[4] - state[5]) / P.track_width, (state[6] - state[7]) / P.track_width]
-    assert state[2] == pytest.approx(np.mean(axle_roll), rel=0.02)  # the body follows the tyres' roll
-    fl, fr, rl, rr = loads(state[1:], high)
-    leaning = high.gravity_roll * sin(state[2])
-    assert (fr - fl + rr - rl) * T == pytest.approx(force * P.cg_height + leaning, rel=1e-7)
-
-
-def test_the_contact_point_stands_still_while_the_body_rolls_about_the_roll_centres():
-    dphi = 0.4
-    y = [0.0] * 14
-    y[8] = dphi
-    found = contact_velocities(0.0, 0.0, 0.0, y, delta=0.0, ride=RIDE, p=P)
-    h_f, h_r = P.roll_centre_height_front, P.roll_centre_height_rear
-    expected = [(P.cg_height - h) * dphi for h in (h_f, h_f, h_r, h_r)]
-    assert found[4:] == pytest.approx(expected, rel=1e-12)
-    assert found[:4] == (0.0,) * 4
 
 
 def test_contact_velocities_are_the_time_derivatives_of_the_contact_points_places():
@@ -191,41 +145,6 @@ def test_the_product_of_inertia_turns_a_yaw_acceleration_into_roll():
     inertia = np.array([[P.yaw_inertia, -80.0], [-80.0, ride.roll]])
     assert (got[0], got[9]) == pytest.approx(np.linalg.solve(inertia, [moment, 0.0]), rel=1e-12)
     assert ride.a == pytest.approx(A)  # the sprung mass stands where the car's centre is
-
-
-def quarter_car(m_s, k, k_t, m_u):
-    """Return the two frequencies [Hz] of a mass on a spring on a mass on a spring."""
-    p = k / m_s + (k + k_t) / m_u
-    root = sqrt(p * p / 4 - k * k_t / (m_s * m_u))
-    return sqrt(p / 2 - root) / (2 * pi), sqrt(p / 2 + root) / (2 * pi)
-
-
-def frequencies(ride):
-    """Return the frequencies [Hz] of the undamped car at rest, rising."""
-    ride = ride._replace(d_f=0.0, d_r=0.0)
-    columns = [np.array(rates(tuple(e), FREE, ride)) / 1e-6 for e in 1e-6 * np.eye(15)]
-    values = np.linalg.eigvals(np.array(columns).T)
-    return np.sort(np.abs(values.imag[values.imag > 1e-3])) / (2 * pi)
-
-
-def test_modes_of_a_car_alike_in_front_and_rear_are_those_of_quarter_cars():
-    p = dataclasses.replace(
-        P,
-        cg_to_front_axle=1.5,
-        cg_to_rear_axle=1.5,
-        spring_stiffness_rear=34000.0,
-        anti_roll_stiffness_rear=14000.0,
-        roll_centre_height_rear=0.06,
-    )
-    ride = ride_of(p)
-    m_u, k, k_t = 45.0, 34000.0, p.tyre_vertical_stiffness
-    heave = quarter_car(p.sprung_mass / 4, k, k_t, m_u)
-    # Gravity, as a spring between body and ground, is not part of a quarter car: leave it out here.
-    ride = ride._replace(gravity_roll=0.0, gravity_pitch=0.0)
-    pitch = quarter_car(ride.pitch / (4 * 1.5**2), k, k_t, m_u)
-    roll = quarter_car(ride.roll / (4 * T**2), k + 2 * 14000.0, k_t, m_u)
-    warp = sqrt((k + 2 * 14000.0 + k_t) / m_u) / (2 * pi)
-    assert frequencies(ride) == pytest.approx(sorted([*heave, *pitch, *roll, warp]), rel=1e-6)
 
 
 @pytest.mark.parametrize(

@@ -55,15 +55,6 @@ def test_a_level_road_without_wind_changes_no_bit():
         assert repr(G - LEVEL.lighter) == repr(G)
 
 
-@plants
-@pytest.mark.parametrize("slope", [0.08, -0.12])
-def test_a_car_that_coasts_on_a_slope_gains_its_part_of_gravity(plant, slope):
-    y = held(stand_of(plant, initial_speed=20.0), 2.0, slope=slope)
-    assert y["velocity_x"] == pytest.approx(20.0 - 2.0 * G * sin(slope), rel=1e-12)
-    assert y["position_x"] == pytest.approx(40.0 - 2.0 * G * sin(slope), rel=1e-12)
-    assert y["acceleration_x"] == pytest.approx(-G * sin(slope), rel=1e-12)
-
-
 def test_a_plant_may_have_inputs_of_its_own_after_those_of_road_and_wind():
     class Mine(SevenDof):
         inputs = (*SevenDof.inputs, "yaw_rate_ref")
@@ -101,19 +92,6 @@ def test_a_steady_bank_takes_the_side_force_that_holds_the_car_and_nothing_else(
     if plant in (SevenDof, TwoDof):
         shift = p.mass * G * sin(bank) * p.cg_height / p.track_width
         assert sum(right) - sum(left) == pytest.approx(2.0 * shift, rel=1e-9)
-
-
-@pytest.mark.parametrize("plant", [EightDof, FourteenDof])
-def test_the_body_rolls_on_a_bank_as_in_a_bend_of_the_same_side_force_on_less_weight(plant):
-    bank, stand = 0.05, stand_of(plant, initial_speed=15.0)
-    p = plant.Parameters()
-    side = forces(p, y=p.mass * G * sin(bank))
-    on_bank, in_bend = (
-        held(stand, 3.0, bank=bank, **side),
-        held(stand_of(plant, initial_speed=15.0), 3.0, **side),
-    )
-    assert on_bank["roll_angle"] == pytest.approx(in_bend["roll_angle"], rel=2e-3)
-    assert on_bank["roll_angle"] > 0.002
 
 
 @lateral

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import atan, cos, pi, sin
+from math import atan, pi, sin
 
 import numpy as np
 import pytest
@@ -114,20 +114,6 @@ def test_the_rates_lag_by_their_time_constant_and_keep_the_area_of_a_jump():
         if k == 20:
             assert y["yaw_acceleration_ref"] > 0.0
     assert area == pytest.approx(0.01 * r_gain, rel=1e-6)
-
-
-def test_the_rate_of_a_sine_is_its_derivative():
-    stand = Stand(SingleTrack, **UNLIMITED)
-    stand.start(velocity_x=20.0)
-    r_gain, _ = CAR.gains(20.0)
-    omega, h = 2 * pi * 0.4, 0.001
-    for k in range(2000):
-        t = (k + 1) * h
-        y = stand.step(h, steer_angle=0.02 * sin(omega * t), velocity_x=20.0)
-        if t > 0.1:
-            late = t - 0.005  # the lag
-            expected = 0.02 * r_gain * omega * cos(omega * late)
-            assert y["yaw_acceleration_ref"] == pytest.approx(expected, abs=2e-4)
 
 
 @pytest.mark.parametrize("mode", ["steady_state", "dynamic"])

@@ -53,17 +53,6 @@ def test_the_switching_functions_differ_only_inside_the_boundary_layer():
     assert saturation(0.0, 0.0) == 0.0
 
 
-def test_a_tail_that_slides_out_is_turned_back_by_the_default_weight():
-    # Left turn, beta far below its reference: a moment to the right lets the sideslip come back.
-    stand = Stand(SlidingMode)
-    stand.start()
-    moment, _ = outputs(stand, 0.2, 0.0, 0.0, 0.0, 0.2, -0.3, 0.0)
-    assert moment < 0.0
-    other = Stand(SlidingMode, sideslip_weight=0.25)
-    other.start()
-    assert outputs(other, 0.2, 0.0, 0.0, 0.0, 0.2, -0.3, 0.0)[0] > 0.0
-
-
 def test_the_moment_fades_out_at_walking_pace():
     stand = Stand(SlidingMode)
     stand.start()

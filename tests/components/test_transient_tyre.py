@@ -6,13 +6,12 @@ from math import exp, pi, sin
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 
 from yawbench.components.cars.wheel_kinematics import slip_angle, slip_ratio
 from yawbench.components.plants.fourteen_dof import FourteenDof
 from yawbench.components.plants.seven_dof import SevenDof
 from yawbench.components.tyre_models.pacejka_2012_set import COMMON, LONGITUDINAL, REST
-from yawbench.components.tyre_models.relaxation import deflected, gripped
+from yawbench.components.tyre_models.relaxation import gripped
 from yawbench.components.tyres.magic_formula_62 import MagicFormula62
 from yawbench.components.tyres.magic_formula_62_transient import MagicFormula62Transient
 from yawbench.vocabulary.wheels import wheels
@@ -45,7 +44,7 @@ def stand(**parameters):
     return Stand(MagicFormula62Transient, wheel_radius=RADIUS, low_speed=LOW, **parameters)
 
 
-@pytest.mark.parametrize("steps", [1, 2, 7, 100])
+@pytest.mark.parametrize("steps", [1, 7])
 @pytest.mark.parametrize(("v", "kappa", "alpha"), [(20.0, 0.0, 0.05), (3.0, 0.0, -0.2), (20.0, -0.06, 0.0)])
 def test_after_the_relaxation_length_a_step_has_come_to_1_less_1_over_e(v, kappa, alpha, steps):
     tyre = stand()
@@ -86,14 +85,6 @@ def test_a_run_begins_in_steady_motion():
     later = tyre.step(5.0, **inputs)
     assert first["tyre_force_y_rr"] == pytest.approx(later["tyre_force_y_rr"], rel=1e-12)
     assert abs(first["tyre_force_y_rr"]) > 500.0
-
-
-def test_the_deflection_is_that_of_its_differential_equation():
-    u_0, s, v, sigma, h = 0.01, 0.7, 6.0, 0.4, 0.13
-    answer = solve_ivp(lambda t, u: s - v * u / sigma, (0, h), [u_0], rtol=1e-11, atol=1e-14)
-    assert deflected(u_0, s, v, sigma, h) == pytest.approx(answer.y[0, -1], rel=1e-9)
-    assert deflected(u_0, s, 0.0, sigma, h) == pytest.approx(u_0 + s * h, rel=1e-12)
-    assert deflected(u_0, s, 1e-9, sigma, h) == pytest.approx(u_0 + s * h, rel=1e-8)
 
 
 def test_a_deflection_beyond_the_grip_is_kept_as_far_as_the_wheel_slides_its_way():
@@ -203,9 +194,9 @@ def test_a_car_that_slides_to_rest_on_locked_wheels_springs_back_by_what_their_c
 
 
 def test_a_braked_wheel_follows_its_equations_however_long_the_step_is():
-    """One millisecond against a twentieth of it, from the first bite of the brake to steady slip."""
+    """One millisecond against a tenth of it, from the first bite of the brake to steady slip."""
     courses = []
-    for steps in (200, 4000):
+    for steps in (200, 2000):
         brake = {"torque": -400.0, "initial_speed": 25.0}
         _, course = driven(SevenDof, 0.2, steps, each=lambda loop: loop["wheel_speed_fl"], **brake)
         courses.append(np.array(course[:: steps // 200]))
@@ -213,25 +204,6 @@ def test_a_braked_wheel_follows_its_equations_however_long_the_step_is():
     rolled_only = fine[0] + (fine[-1] - fine[0]) * np.linspace(0, 1, len(fine))
     assert np.max(np.abs(fine - rolled_only)) > 0.2  # there is something to follow
     assert np.max(np.abs(coarse - fine)) < 0.02 * np.max(np.abs(fine - rolled_only))
-
-
-def test_a_car_runs_straight_and_lags_in_its_first_turn():
-    loop, _ = driven(SevenDof, 1.0, 1000)
-    assert abs(loop["position_y"]) < 1e-9
-    rates = {}
-    for tyre in (MagicFormula62, MagicFormula62Transient):
-        frictions = dict.fromkeys(wheels("friction_*"), 1.0)
-        parameters = {"wheel_radius": RADIUS} if tyre is MagicFormula62Transient else {}
-        units = [(SevenDof, {"wheel_radius": RADIUS}), (tyre, parameters)]
-        loop = Loop(units, algorithm="extrapolated", constants=frictions)
-        loop.constants["steer_angle"] = 0.02
-        loop.run(0.04, 40, lambda _: None)
-        early = loop["yaw_rate"]
-        loop.run(2.0, 2000, lambda _: None)
-        rates[tyre] = early, loop["yaw_rate"]
-    (early, steady), (early_lagging, steady_lagging) = rates.values()
-    assert early_lagging < 0.8 * early
-    assert steady_lagging == pytest.approx(steady, rel=1e-3)
 
 
 def test_the_coupling_with_the_car_is_of_second_order_in_the_step():

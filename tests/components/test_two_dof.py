@@ -7,7 +7,6 @@ from math import atan2, cos, log2, pi, sin
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 
 from tests.evidence import measured
 from yawbench.components.cars.load_transfer import quasi_static_loads
@@ -21,7 +20,8 @@ from yawbench.components.tyre_models.bakker_1987 import (
 from yawbench.components.tyres.linear import LinearTyre
 from yawbench.components.tyres.magic_formula_1987 import MagicFormula1987
 
-from .loop import Hold, Loop
+from . import monolith
+from .loop import Hold, drive_on
 from .magic import forces_1987
 from .stand import Stand, four, wheel_values
 
@@ -31,26 +31,10 @@ L = A + B
 SPEED, G = 25.0, 9.81
 
 
-def drive(
-    tyre=MagicFormula1987,
-    *,
-    driver=None,
-    mu=0.5,
-    until=3.0,
-    h=1e-3,
-    record,
-    tyre_parameters=None,
-    **constants,
-):
+def drive(tyre=MagicFormula1987, *, mu=0.5, until=3.0, h=1e-3, record, driver=None, **tyres):
     """Return the recorded signals (rows) of driver, car and tyre in a loop."""
-    driver = driver or (Sine, {"amplitude": 0.05, "frequency": 0.5, "start_time": 0.5})
-    car = {k: constants.pop(k) for k in list(constants) if k.startswith("initial")}
-    loop = Loop(
-        [driver, (TwoDof, car), (tyre, tyre_parameters or {})],
-        algorithm="extrapolated",
-        constants={**four("friction", mu), **constants},
-    )
-    return np.array(loop.run(until, round(until / h), lambda now: [now[name] for name in record])).T
+    sine = Sine, {"amplitude": 0.05, "frequency": 0.5, "start_time": 0.5}
+    return drive_on([driver or sine, (TwoDof, {}), (tyre, tyres)], until=until, h=h, record=record, mu=mu)
 
 
 # ---- linear theory
@@ -65,40 +49,12 @@ def test_steady_state_yaw_rate_matches_the_understeer_formula():
         until=8.0,
         h=4e-3,
         record=record,
-        tyre_parameters={"cornering_stiffness": c},
+        cornering_stiffness=c,
     )[:, -1]
     k = M / L**2 * (B - A) / (2 * c)
     gain = 1e-4 / (L * (1 + k * SPEED**2))
     assert r == pytest.approx(SPEED * gain, rel=1e-6)
     assert beta == pytest.approx((B - M * A * SPEED**2 / (2 * c * L)) * gain, rel=1e-6)
-
-
-@pytest.mark.parametrize("frequency", [0.5, 2.0])
-def test_the_response_to_a_yaw_moment_is_that_of_the_linear_single_track_model(frequency):
-    c = 2 * 50000.0
-    s = 2j * pi * frequency
-    matrix = np.array(
-        [
-            [M * s + 2 * c / SPEED, M * SPEED + (A - B) * c / SPEED],
-            [(A - B) * c / SPEED, I_Z * s + (A * A + B * B) * c / SPEED],
-        ]
-    )
-    expected = np.linalg.solve(matrix, [0.0, 1.0])[1]
-    car, tyre = Stand(TwoDof), Stand(LinearTyre)
-    y = car.start()
-    names = [v.name for v in LinearTyre.variables if v.causality == "input" and "friction" not in v.name]
-    forces = tyre.start(**{n: y[n] for n in names})
-    before = forces
-    h, found = 1e-3, []
-    for k in range(4000):
-        middle = {n: 1.5 * forces[n] - 0.5 * before[n] for n in forces if "force_y" in n}
-        y = car.step(h, yaw_moment=100.0 * sin(2 * pi * frequency * (k + 0.5) * h), **middle)
-        before, forces = forces, tyre.step(h, **{n: y[n] for n in names})
-        found.append(y["yaw_rate"])
-    t = h * np.arange(1, 4001)
-    last = t > 2.0 + 0.5 * h
-    phasor = 2j * np.mean(np.array(found)[last] * np.exp(-2j * pi * frequency * t[last])) / 100.0
-    assert phasor / expected == pytest.approx(1.0, abs=3e-4)
 
 
 # ---- closed forms
@@ -129,21 +85,6 @@ def test_longitudinal_tyre_forces_do_nothing():
     one.start(steer_angle=0.1)
     other.start(steer_angle=0.1)
     assert one.step(0.01, **four("tyre_force_x", -900.0)) == other.step(0.01)
-
-
-def test_a_circle_is_driven_as_a_circle():
-    r = 0.5
-    stand = Stand(TwoDof, initial_yaw_rate=r)
-    centripetal = four("tyre_force_y", *[0.5 * M * SPEED * r * x / L for x in (B, B, A, A)])
-    stand.start(**centripetal)
-    for _ in range(400):
-        y = stand.step(0.01)
-    assert y["velocity_y"] == pytest.approx(0.0, abs=1e-9)
-    radius = SPEED / r
-    assert y["position_x"] == pytest.approx(radius * sin(2.0), rel=1e-8)
-    assert y["position_y"] == pytest.approx(radius * (1 - cos(2.0)), rel=1e-8)
-    assert y["acceleration_y"] == pytest.approx(SPEED * r)
-    assert y["sideslip_rate"] == pytest.approx(0.0, abs=1e-12)
 
 
 def test_wheel_loads_carry_the_moment_of_the_lateral_acceleration_and_no_more():
@@ -198,15 +139,7 @@ def exact(mu, until=3.0):
         ]
 
     times = np.linspace(0.0, until, round(until / 4e-3) + 1)
-    columns, state = np.empty((5, len(times))), np.zeros(5)
-    for begin, end in ((0.0, 0.5), (0.5, 2.5), (2.5, until)):
-        piece = solve_ivp(
-            derivatives, (begin, end), state, method="DOP853", rtol=1e-10, atol=1e-11, dense_output=True
-        )
-        inside = (times >= begin) & (times <= end)
-        columns[:, inside] = piece.sol(times[inside])
-        state = piece.y[:, -1]
-    return columns
+    return monolith.pieces(derivatives, np.zeros(5), times, kinks=[0.5, 2.5], tolerance=1e-10, scale=0.1)
 
 
 def errors(h, mu=0.5):

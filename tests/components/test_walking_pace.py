@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from math import log2
-
 import numpy as np
 import pytest
 
@@ -11,15 +9,12 @@ from yawbench.components.drivers.sine import Sine
 from yawbench.components.plants.eight_dof import EightDof
 from yawbench.components.plants.fourteen_dof import FourteenDof
 from yawbench.components.plants.seven_dof import SevenDof
-from yawbench.components.tyre_models.pacejka_2002_set import MagicFormulaParameters, coefficients
 from yawbench.components.tyres.dugoff import Dugoff
 from yawbench.components.tyres.linear import LinearTyre
 from yawbench.components.tyres.magic_formula import MagicFormula
 from yawbench.components.tyres.magic_formula_1987 import MagicFormula1987
 
-from . import monolith, monolith_b
-from .loop import Loop
-from .magic import forces_and_moment
+from .loop import drive_on
 from .stand import four
 
 pytestmark = pytest.mark.sampled(1)
@@ -49,12 +44,8 @@ def drive(
     """Return the recorded signals (rows); tyres find their wires by name, as in a scenario."""
     sine = {"amplitude": steer, "frequency": 0.4, "start_time": 0.2}
     limited = {"limited": True} if tyre is LinearTyre else {}
-    loop = Loop(
-        [(Sine, sine), (plant, {"initial_speed": speed}), (tyre, limited)],
-        algorithm=algorithm,
-        constants={**four("friction", mu), **four("wheel_torque", *torque)},
-    )
-    return np.array(loop.run(until, round(until / h), lambda now: [now[name] for name in record])).T
+    units = [(Sine, sine), (plant, {"initial_speed": speed}), (tyre, limited)]
+    return drive_on(units, until=until, h=h, record=record, mu=mu, torque=torque, algorithm=algorithm)
 
 
 PLANTS = [SevenDof, EightDof, FourteenDof]
@@ -109,66 +100,3 @@ def test_a_car_at_rest_stays_at_rest_with_the_wheels_turned(plant, tyre, torque)
     record = ["velocity_x", "velocity_y", "yaw_rate", "position_x", "wheel_speed_fl", "wheel_speed_rr"]
     run = drive(plant, tyre, torque=(torque,), until=0.3, speed=0.0, steer=0.3, record=record)
     assert not run.any()
-
-
-@pytest.mark.parametrize("plant", PLANTS)
-def test_driving_off_from_rest_is_calm(plant):
-    run = drive(
-        plant,
-        MagicFormula,
-        torque=(150.0,),
-        until=2.0,
-        speed=0.0,
-        record=["velocity_x", *four("wheel_speed", 0.0)],
-    )
-    assert np.diff(run[:, 100:]).min() > 0.0  # they only ever gain speed
-    assert run[0, -1] > 1.0
-
-
-MAGIC = coefficients(MagicFormulaParameters(), "front")
-SLOW = 7.0
-BRAKES = (-350.0, -350.0, -150.0, -150.0)
-
-
-@pytest.fixture(scope="module")
-def slow_braking():
-    """v_x, r and the wheel speeds of paper B's car braking in a turn from 7 to 5.5 m/s, every 4 ms."""
-
-    def tyre(alpha, kappa, load, mu):
-        return forces_and_moment(kappa, alpha, load, mu, MAGIC)[:2]
-
-    times = np.linspace(0.0, 0.6, 151)
-    exact = monolith_b.solve(
-        times,
-        tyre=tyre,
-        steer=monolith.sine(0.05, 0.4, 0.2, 1.0),
-        speed=SLOW,
-        mu=[0.8] * 4,
-        torque=lambda t: BRAKES,
-        kinks=[0.2],
-        tolerance=1e-8,
-    )
-    return exact[[0, 2, 8, 9, 10, 11]]
-
-
-def slow_errors(exact, tyre, h):
-    record = ["velocity_x", "yaw_rate", *four("wheel_speed", 0.0)]
-    run = drive(EightDof, tyre, torque=BRAKES, until=0.6, speed=SLOW, steer=0.05, record=record, h=h)
-    error = np.abs(run[:, :: round(4e-3 / h)] - exact)
-    return error.max(axis=1) / np.abs(exact).max(axis=1)
-
-
-def test_where_slip_is_faster_than_the_step_a_tyre_that_tells_its_stiffness_is_nearer_to_the_truth(
-    slow_braking,
-):
-    # The slip decays with 440 to 900 1/s.
-    told, silent = (slow_errors(slow_braking, tyre, 2e-3) for tyre in (MagicFormula, SilentMagicFormula))
-    assert np.all(told < 7e-4), told
-    assert np.all(told < 0.5 * silent)
-
-
-def test_there_too_the_order_is_two(slow_braking):
-    coarse, fine = (slow_errors(slow_braking, MagicFormula, h) for h in (2e-3, 5e-4))
-    assert np.all(fine < 7e-5)
-    assert log2(coarse[0] / fine[0]) / 2 > 1.8  # speed
-    assert log2(coarse[1] / fine[1]) / 2 > 1.8  # yaw rate

@@ -25,11 +25,8 @@ PAGES = [
 NOT_RUN = {
     r"make \w+": "sets up an environment from the network; what it then calls is run here or is the test run",
     r"\S*python -m pip install .*": "takes packages from the network",
-    r"\S*yawbench study scenarios/fnn_sideslip/\w+\.yaml": "tests/scenarios/test_paper_a.py",
-    r"\S*yawbench study scenarios/fuzzy_sliding_mode/\w+\.yaml": "tests/scenarios/test_fuzzy_sliding_mode.py",
-    r"\S*yawbench study scenarios/fuzzy_feedback/\w+\.yaml": "tests/scenarios/test_fuzzy_feedback.py",
+    r"\S*yawbench study scenarios/(fnn_sideslip|fuzzy_\w+)/\w+\.yaml": "tests/scenarios/test_papers.py",
     r"\S*yawbench study scenarios/real_signals/\w+\.yaml": "tests/scenarios/test_real_signals.py",
-    r"\S*yawbench study scenarios/fuzzy_pid/\w+\.yaml": "tests/scenarios/test_fuzzy_pid.py",
     r"\S*yawbench serve.*": "until Ctrl-C; tests/bench/test_serve.py",
     r"\S*yawbench drive .*": "minutes; test_sine_with_dwell.py drives short ones",
     r"\S*yawbench rank.*": "half an hour; tests/ranking/test_ranking_page.py drives a small one",

@@ -86,7 +86,3 @@ def test_extrapolated_is_of_second_order(error):
 @pytest.mark.parametrize("algorithm", ["gauss_seidel", "jacobi"])
 def test_the_classical_algorithms_are_of_first_order(error, algorithm):
     assert order(error, algorithm) == pytest.approx(1.0, abs=0.1)
-
-
-def test_gauss_seidel_shows_the_error_that_held_forces_cost(error):
-    assert error("gauss_seidel", 1) > 50 * error("extrapolated", 1)

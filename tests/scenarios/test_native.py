@@ -64,7 +64,7 @@ def test_shortened_scenarios_with_every_native_unit_give_the_same_bits():
     build_all(FMUS)
     native = set()
     for name, (step, swaps) in RUNS.items():
-        scenario = yb.load(name).swap(**swaps).set({"stop_time": 0.5, "step_size": step})
+        scenario = yb.load(name).swap(**swaps).set({"stop_time": 0.25, "step_size": step})
         one, other = (run_as(units, scenario) for units in ("native", "python"))
         assert_same_bits(one, other)
         native |= {fmu for fmu, how in ways(one).items() if how == "native"}

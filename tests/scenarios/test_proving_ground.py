@@ -60,12 +60,6 @@ def test_ratios_do_not_depend_on_the_step():
     assert coarse["displacement"] == pytest.approx(fine["displacement"], abs=0.001)
 
 
-def test_left_and_right_are_mirrors():
-    left, right = dwell(179.5), dwell(-179.5)
-    for key in ("ratio_1000", "ratio_1750", "displacement", "sideslip"):
-        assert left[key] == pytest.approx(right[key], abs=1e-6), key
-
-
 def test_hard_takes_iso_3888_2_at_60_km_per_h_clean_with_fuzzy_pid_and_not_without_control():
     """Without control it is clean up to 59.0 km/h, with fuzzy PID up to 61.6."""
     settings = {"step_size": 0.002, "controller.step_size": 0.004, "allocator.step_size": 0.004}

@@ -31,13 +31,6 @@ def test_every_entry_has_every_level_of_the_main_setting(published):
     assert published.complete[threats.main] == threats.entries_in(threats.main)
 
 
-def test_every_threat_of_the_main_setting_has_six_cars(published):
-    threats = published.threats
-    faced = {name: threats.cars_facing(threats.main, name) for name in threats.threats_in(threats.main)}
-    assert len(faced) == 13
-    assert {len(cars) for cars in faced.values()} == {6}
-
-
 def test_every_entry_has_driven_every_discipline(published):
     threats = published.threats
     assert published.complete[LANE_CHANGE] == threats.entries_in(LANE_CHANGE)

@@ -12,7 +12,7 @@ from docs.generate.__main__ import PUBLISHED
 from docs.generate.papers import KINDS, OTHERS, STUDIES, Numbers, numbers_of, record, recorded, study_of
 from tests.checkout import ROOT
 from tests.evidence import RECORD
-from tests.judged_studies import judge_all
+from tests.judged_studies import check_figures, judge_all
 from tests.scenarios.recorded_numbers import assert_recorded
 from yawbench.orchestrator.results.folder_names import default_folder
 from yawbench.studies.claim_schema import MetricReference
@@ -34,14 +34,14 @@ def test_every_recorded_number_and_verdict_is_what_all_runs_come_to(name, tmp_pa
         made.is_file() and name in STUDIES
     ):  # by `make report`: each run is known by the hash of all that it follows from
         shutil.copyfile(made, tmp_path / JOURNAL)
-    judge_all(file, tmp_path)
-    found = numbers_of(tmp_path, name)
+    study = judge_all(file, tmp_path)
     if os.environ.get(RECORD):
-        record(name, found)
+        record(name, numbers_of(tmp_path, name))
+    found = assert_recorded(name, study)
     assert recorded()[name].claims == found.claims, f"{RECORD}=1 writes {papers.FILE.name} anew"
     assert recorded()[name].verdicts == found.verdicts
     assert found.runs.keys() == recorded()[name].runs.keys()
-    assert_recorded(name, found)
+    check_figures(study, *(figure.name for figure in study_of(name).spec.figures))
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Fuzzy sliding mode: the gains of the printed table, and the law with the saturation."""
+"""Fuzzy controllers of the sideslip: moments of their rules, gains of the printed table."""
 
 from __future__ import annotations
 
@@ -6,10 +6,29 @@ import numpy as np
 import pytest
 
 from yawbench.components.control_laws.sliding_surface import ERRORS
+from yawbench.components.controllers.fuzzy_sideslip import FuzzySideslip
 from yawbench.components.controllers.fuzzy_sliding_mode import FuzzySlidingMode
 from yawbench.components.controllers.sliding_mode import SlidingMode
 
 from .stand import Stand
+
+
+def moment(e: float, rate: float = 0.0, **parameters: float) -> float:
+    stand = Stand(FuzzySideslip, error_range=0.02, error_rate_range=0.2, **parameters)
+    return stand.start(sideslip_ref=e, sideslip_rate_ref=rate)["yaw_moment"]
+
+
+def test_moment_of_a_rule_is_the_centroid_of_its_output_set():
+    third = 5000.0 / 3.0
+    assert moment(0.02 / 3.0) == pytest.approx(-third, abs=1e-9)  # PS, ZO -> PS
+    assert moment(0.02 / 3.0, 0.2 / 3.0) == pytest.approx(-2.0 * third, abs=1e-9)  # PS, PS -> PM
+    assert moment(0.02, -0.2) == pytest.approx(0.0, abs=1e-9)  # PB, NB -> ZO
+
+
+def test_largest_moment_is_the_centroid_of_the_outermost_set():
+    assert moment(1.0, 1.0) == pytest.approx(-5000.0 * 8.0 / 9.0, abs=1e-9)
+    assert moment(1.0, 1.0, moment_range=900.0) == pytest.approx(-800.0, abs=1e-9)
+
 
 TABLE = [
     ["SS", "SS", "S", "S", "M"],

@@ -1,4 +1,4 @@
-"""Motor and friction brake: closed-form step responses, exact delays, blending, limits."""
+"""Actuators: torque from force, motors and brakes that lag and are limited, added steering."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ import pytest
 
 from yawbench.components.actuators.lag import Lag, blend
 from yawbench.components.mathematics.first_order_lag import relax
+from yawbench.components.steering_actuators.superposition import Superposition
+from yawbench.components.wheel_controls.direct import Direct
 
 from .stand import Stand, four
 
@@ -109,3 +111,47 @@ def test_old_requests_are_forgotten():
         stand.step(1e-3, **request(float(k % 7)))
     assert len(stand.unit.brakes[0].history) <= 20
     assert len(stand.unit.motors[0].history) <= 6
+
+
+def torques(*forces, **parameters):
+    stand = Stand(Direct, **parameters)
+    inputs = dict(zip(("fl", "fr", "rl", "rr"), forces, strict=True))
+    return list(stand.start(**{f"force_request_{w}": f for w, f in inputs.items()}).values())
+
+
+def test_torque_is_force_times_radius():
+    assert torques(100.0, -200.0, 0.0, 1000.0, wheel_radius=0.25) == [25.0, -50.0, 0.0, 250.0]
+
+
+def test_torque_stops_at_the_limit_on_both_sides_of_zero():
+    assert torques(1e5, -1e5, 401.0, -401.0, wheel_radius=1.0) == [400.0, -400.0, 400.0, -400.0]
+    assert torques(1e5, -1e5, 1.0, -1.0, torque_limit=0.0) == [0.0, 0.0, 0.0, 0.0]
+
+
+@pytest.mark.parametrize("h", [1e-3, 5e-3])
+def test_the_added_angle_is_a_delayed_exponential(h):
+    stand = Stand(Superposition, rate_limit=100.0, delay=0.0033)
+    stand.start()
+    for k in range(40):
+        y = stand.step(h, steer_angle=0.1, added_steer_angle_request=0.02)
+        late = max((k + 1) * h - 0.0033, 0.0)
+        assert y["added_steer_angle"] == pytest.approx(0.02 * (1.0 - exp(-late / 0.016)), abs=1e-12)
+        assert y["total_steer_angle"] == 0.1 + y["added_steer_angle"]
+
+
+def test_without_a_request_the_total_is_the_drivers_angle_to_the_last_bit():
+    stand = Stand(Superposition)
+    stand.start(steer_angle=0.123)
+    for k in range(20):
+        assert stand.step(1e-3, steer_angle=0.01 * k / 7.0)["total_steer_angle"] == 0.01 * k / 7.0
+
+
+def test_rate_and_range_hold():
+    stand = Stand(Superposition, rate_limit=0.5, range=0.05)
+    stand.start()
+    before = 0.0
+    for _ in range(200):
+        added = stand.step(1e-3, added_steer_angle_request=1.0)["added_steer_angle"]
+        assert added - before <= 0.5e-3 * (1.0 + 1e-9)
+        before = added
+    assert before == pytest.approx(0.05, abs=1e-5)

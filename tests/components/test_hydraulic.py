@@ -1,4 +1,4 @@
-"""Braking one wheel: the four rows of the rule, its guard, its dead band; hydraulic brakes."""
+"""Hydraulic brakes: pressure that lags and is limited, and its release from wheels that slip."""
 
 from __future__ import annotations
 
@@ -6,70 +6,10 @@ import math
 
 import pytest
 
-from yawbench.components.allocators.single_wheel import FL, FR, RL, RR, SingleWheel
-from yawbench.components.cars.wheel_kinematics import lever_arms
 from yawbench.components.tyres.magic_formula import MagicFormula
 from yawbench.components.wheel_controls.hydraulic import Hydraulic, HydraulicParameters, asked_pressure
 
-from .stand import Stand, wheel_values
-
-
-def forces(outputs):
-    return wheel_values(outputs, "force_request")
-
-
-def request(*, moment, delta, dr, drive=0.0, **parameters):
-    stand = Stand(SingleWheel, **parameters)
-    return forces(
-        stand.start(yaw_moment=moment, steer_angle=delta, yaw_rate=dr, yaw_rate_ref=0.0, drive_force=drive)
-    )
-
-
-def test_straight_ahead_left_and_right_are_alike_but_as_printed():
-    for choice in ("guarded", "moment"):
-        braked = [
-            request(moment=-900.0 * side, delta=0.0, dr=0.1 * side, wheel_choice=choice)
-            for side in (1.0, -1.0)
-        ]
-        assert [[i for i, f in enumerate(found) if f] for found in braked] == [[FR], [FL]]
-        assert braked[0][FR] == braked[1][FL] < 0.0
-    assert request(moment=-900.0, delta=0.0, dr=0.1, wheel_choice="printed")[RR] < 0.0
-    assert request(moment=900.0, delta=0.0, dr=-0.1, wheel_choice="printed")[FL] < 0.0
-
-
-@pytest.mark.parametrize(
-    "moment, delta, dr, wheel",
-    [(-900.0, 0.05, 0.1, FR), (900.0, 0.05, -0.1, RL), (-900.0, -0.05, 0.1, RR), (900.0, -0.05, -0.1, FL)],
-)
-def test_the_chosen_wheel_alone_gives_the_moment(moment, delta, dr, wheel):
-    found = request(moment=moment, delta=delta, dr=dr)
-    assert [i for i, f in enumerate(found) if f] == [wheel]
-    assert found[wheel] < 0.0
-    assert found[wheel] * lever_arms(delta, 1.4, 0.8)[wheel] == pytest.approx(moment, rel=1e-12)
-
-
-def test_a_wheel_that_turns_the_car_the_other_way_is_left_alone():
-    case = {"moment": 900.0, "delta": 0.05, "dr": 0.1}
-    assert request(**case) == [0.0] * 4
-    printed = request(**case, wheel_choice="printed")
-    assert printed[FR] < 0.0  # and turns the car against the moment
-    assert request(**case, wheel_choice="moment")[RL] < 0.0
-
-
-def test_braking_has_a_dead_band_with_hysteresis():
-    stand = Stand(SingleWheel)
-    rest = {"steer_angle": 0.05, "yaw_rate": -0.1, "yaw_rate_ref": 0.0}
-    stand.start(yaw_moment=0.0, **rest)
-    steps = [(190.0, 0.0), (210.0, 1.0), (110.0, 1.0), (90.0, 0.0), (190.0, 0.0)]
-    assert [bool(forces(stand.step(0.01, yaw_moment=m, **rest))[RL]) for m, _ in steps] == [
-        bool(on) for _, on in steps
-    ]
-
-
-def test_the_driver_s_force_is_kept_equal_left_and_right():
-    found = request(moment=900.0, delta=0.05, dr=-0.1, drive=600.0)
-    without = request(moment=900.0, delta=0.05, dr=-0.1)
-    assert [a - b for a, b in zip(found, without, strict=True)] == pytest.approx([0.0, 0.0, 300.0, 300.0])
+from .stand import Stand
 
 
 def test_a_pressure_step_answers_with_the_lag_below_the_rate_limit():
