@@ -436,8 +436,7 @@ def of(results, name):
     return None if value is None else value.number
 
 
-@pytest.mark.parametrize("sideways", [True, False])
-@pytest.mark.parametrize(("unit", "speed_unit"), [("rad", "m/s"), ("deg", "km/h")])
+@pytest.mark.parametrize(("sideways", "unit", "speed_unit"), [(True, "rad", "m/s"), (False, "deg", "km/h")])
 def test_the_sideslip_of_a_car_that_brakes_straight_to_rest_is_that_while_it_moves(
     sideways, unit, speed_unit
 ):
@@ -455,35 +454,33 @@ def test_the_sideslip_of_a_car_that_brakes_straight_to_rest_is_that_while_it_mov
     assert not np.isnan(run.columns["plant.sideslip"]).any()  # what was recorded stays
 
 
-def test_a_car_that_spins_at_speed_and_comes_to_rest_has_spun():
-    turned = np.radians([0.0, 30.0, 90.0, 150.0, -170.0, -170.0])
-    run = moving_car([20.0, 18.0, 15.0, 12.0, 8.0, 0.0], turned)
-    assert of(run, "peak(sideslip)") == pytest.approx(np.radians(170.0))
-    assert of(run, "total_variation(sideslip)") == pytest.approx(np.radians(190.0))  # on through 180 degrees
+WRAPPING = np.radians([150.0, 170.0, -170.0, -150.0, -130.0])
 
 
-def test_a_car_that_starts_from_rest_and_one_that_never_moves():
-    run = moving_car([0.0, 0.0, 5.0, 10.0], [np.pi, -np.pi, 0.1, 0.05])
-    assert of(run, "peak(sideslip)") == pytest.approx(0.1)
-    stands = moving_car([0.0, 0.1, 0.0], [np.pi, 1.0, 2.0])
-    assert of(stands, "peak(sideslip)") is None
-    assert "10 km/h" in why_none(stands, metric("peak(sideslip)"), None, 0.2)
+@pytest.mark.parametrize(
+    ("speeds", "sideslip", "name", "expected"),
+    [
+        ([20, 18, 15, 8, 0], np.radians([0, 90, 150, -170, -170]), "peak(sideslip)", np.radians(170.0)),
+        ([20, 18, 15, 8, 0], np.radians([0, 90, 150, -170, -170]), "total_variation(sideslip)",
+         np.radians(190.0)),  # on through 180 degrees
+        ([0.0, 0.0, 5.0, 10.0], [np.pi, -np.pi, 0.1, 0.05], "peak(sideslip)", 0.1),  # starts from rest
+        ([0.0, 0.1, 0.0], [np.pi, 1.0, 2.0], "peak(sideslip)", None),  # never moves
+        # the clock of a mean stands while the car does
+        ([10, 10, 10, 0, 0, 10, 10, 10], [0.1, 0.1, 0.1, 3, -3, 0.3, 0.3, 0.3], "rms(sideslip)", 0.05**0.5),
+        ([10, 10, 10, 0, 0, 10, 10, 10], [0.1, 0.1, 0.1, 3, -3, 0.3, 0.3, 0.3], "effort(sideslip)", 0.1),
+        ([10.0] * 5, WRAPPING, "phase_area(sideslip)", np.radians(200.0) ** 2 * 0.4),
+    ],
+)  # fmt: skip
+def test_angles_of_a_velocity_count_while_the_car_moves(speeds, sideslip, name, expected):
+    run = moving_car(speeds, sideslip)
+    assert of(run, name) == (None if expected is None else pytest.approx(expected))
+    if expected is None:
+        assert "10 km/h" in why_none(run, metric(name), None, 0.2)
 
 
-def test_the_clock_of_a_mean_stands_while_the_car_does():
-    stop = moving_car([10, 10, 10, 0, 0, 0, 0, 10, 10, 10], [0.1, 0.1, 0.1, 3, -3, 3, -3, 0.3, 0.3, 0.3])
-    assert of(stop, "rms(sideslip)") == pytest.approx(
-        of(moving_car([10] * 6, [0.1] * 3 + [0.3] * 3), "rms(sideslip)")
-    )
-    assert of(stop, "effort(sideslip)") == pytest.approx(0.02 + 0.02 + 0.06)
-
-
-def test_no_rate_jumps_where_a_sideslip_wraps_at_180_degrees():
-    turned = np.radians([150.0, 170.0, -170.0, -150.0, -130.0])
-    run = moving_car([10.0] * 5, turned)
-    assert of(run, "phase_area(sideslip)") == pytest.approx(np.radians(200.0) ** 2 * 0.4)
-    reference = moving_car([10.0] * 5, turned, reference__sideslip_ref=np.radians([150, 175, 178, 179, 180]))
-    assert of(reference, "peak_error(sideslip)") == pytest.approx(np.radians(50.0))
+def test_no_error_jumps_where_a_sideslip_wraps_at_180_degrees():
+    run = moving_car([10.0] * 5, WRAPPING, reference__sideslip_ref=np.radians([150, 175, 178, 179, 180]))
+    assert of(run, "peak_error(sideslip)") == pytest.approx(np.radians(50.0))
 
 
 def test_slip_angles_and_estimates_count_while_the_true_car_moves():
