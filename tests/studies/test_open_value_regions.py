@@ -12,6 +12,7 @@ from lxml import html
 
 from tests.checkout import ROOT
 from tests.refusals import mentions, refused
+from tests.studies.experiment_files import written
 from yawbench.foundation.errors import Diagnostic, ScenarioError
 from yawbench.metrics.expressions import MetricValue
 from yawbench.metrics.verdict import Status, Verdict, all_of, compare, not_judged, worst
@@ -71,14 +72,8 @@ def judged(tmp_path, fmus):
     """Judge the study, texts of it replaced, with the closed form in place of runs."""
 
     def judge(*changes: tuple[str, str], failing=lambda peak: False) -> ExperimentResult:
-        text = STUDY
-        for old, new in changes:
-            assert old in text
-            text = text.replace(old, new)
-        (tmp_path / "study.yaml").write_text(text)
-        (tmp_path / "sine.yaml").write_text(SCENARIO)
-        (tmp_path / "double.yaml").write_text(SCENARIO.replace("0.05", "0.1"))
-        experiment = load_experiment(tmp_path / "study.yaml")
+        double = SCENARIO.replace("0.05", "0.1")
+        experiment = load_experiment(written(tmp_path, STUDY, *changes, sine=SCENARIO, double=double))
         planner = Planner()
         planned = plan_experiment(experiment, tmp_path / "o", fmus=fmus, planner=planner)
 
@@ -209,7 +204,7 @@ def test_a_variant_may_put_another_scenario_in_place_of_a_runs(judged):
         (("points: 20", "points: 2"), ("region.points", "10", "2")),
         (  # runs of one claim that differ in an open value need factors
             ("times: true, from: 0.5, to: 1.5", "from: 0.025, to: 0.075"),
-            ("study.yaml", "region.open_values.amplitude", "0.05", "0.1", "`times: true`", "`runs`"),
+            ("experiment.yaml", "region.open_values.amplitude", "0.05", "0.1", "`times: true`", "`runs`"),
         ),
     ],
 )
@@ -288,16 +283,12 @@ def test_the_spread_is_how_far_the_worst_tenth_comes_towards_the_threshold():
     assert Region(at_margin(-0.5), points, (), ten).spread == pytest.approx(1.4)
 
 
-def test_study_makes_the_runs_of_the_region_once_and_quick_leaves_them_out(
-    fmus, tmp_path, monkeypatch, yawbench
-):
-    (tmp_path / "sine.yaml").write_text(SCENARIO)
-    small = STUDY.replace("from: 0.5, to: 1.5", "values: [0.5, 1.5]").replace("[0.5, 1, 2]", "[0.5, 2]")
-    (tmp_path / "study.yaml").write_text(small)
-    monkeypatch.chdir(tmp_path)
+def test_study_makes_the_runs_of_the_region_once_and_quick_leaves_them_out(fmus, tmp_path, yawbench):
+    fewer = (("from: 0.5, to: 1.5", "values: [0.5, 1.5]"), ("[0.5, 1, 2]", "[0.5, 2]"))
+    file = written(tmp_path, STUDY, *fewer, sine=SCENARIO)
 
     def study(*options: str) -> tuple[str, str, dict, str]:
-        status, out, said = yawbench("study", "study.yaml", "--out", "o", "--fmus", fmus, *options)
+        status, out, said = yawbench("study", file, "--out", tmp_path / "o", "--fmus", fmus, *options)
         assert status == 0
         record, page = (
             (tmp_path / "o" / name).read_text("utf-8") for name in ("experiment.json", "report.html")

@@ -8,6 +8,7 @@ import pytest
 from lxml import html
 
 from tests.refusals import mentions, refused
+from tests.studies.experiment_files import written
 from yawbench.commands.experiments import chapter_of
 from yawbench.components.sensing.noise import key, normal
 from yawbench.figures.display import shown, shown_value
@@ -76,17 +77,7 @@ UNITS = ("sensor_ideal",)
 def load(tmp_path_factory):
     """Write the study with texts replaced and return it as loaded."""
     folder = tmp_path_factory.mktemp("study")
-    (folder / "gyro.yaml").write_text(SCENARIO)
-
-    def load(*changes):
-        text = STUDY
-        for old, new in changes:
-            assert old in text
-            text = text.replace(old, new)
-        (folder / "study.yaml").write_text(text)
-        return load_experiment(folder / "study.yaml")
-
-    return load
+    return lambda *changes: load_experiment(written(folder, STUDY, *changes, gyro=SCENARIO))
 
 
 @pytest.fixture(scope="module")

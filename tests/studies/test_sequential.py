@@ -82,17 +82,6 @@ def test_so_it_is_at_the_points_of_the_extended_hypercube():
         assert cells(found[share]) == published(share)[HYPERCUBE]
 
 
-def test_claims_far_from_the_limit_are_decided_early():
-    chance = np.random.default_rng(3)
-
-    def numbers(share: float) -> list[int]:
-        return [stop(one) for one in chance.random((200, TEST.looks[-1])) < share]
-
-    assert set(numbers(0.0)) == {48}  # 0.9**48 is below what may be spent there, 0.9**32 is not
-    assert np.mean(numbers(0.5)) < 25
-    assert np.mean(numbers(0.1)) > 110
-
-
 def test_the_errors_at_the_limit_are_exact_and_nowhere_exceed_what_may_be_spent():
     low, high = TEST._tails(TEST.limit, TEST.boundaries[-1][0], TEST.looks[-1])
     assert 0.5 * TAIL < low <= TAIL

@@ -15,6 +15,7 @@ from lxml import html
 from tests.orchestrator.recorded import car, write
 from tests.refusals import each_mentions, mentions, refused, texts_of
 from tests.reports.made_up import unpacked
+from tests.studies.experiment_files import written
 from yawbench.foundation.errors import Diagnostic, ScenarioError
 from yawbench.metrics.expressions import MetricValue
 from yawbench.orchestrator.plan import Override
@@ -78,17 +79,7 @@ figures:
 @pytest.fixture
 def study(tmp_path):
     """Load the study with texts of it replaced."""
-
-    def load(*changes: tuple[str, str]):
-        text = STUDY
-        for old, new in changes:
-            assert old in text
-            text = text.replace(old, new)
-        path = tmp_path / "study.yaml"
-        path.write_text(text)
-        return load_experiment(path)
-
-    return load
+    return lambda *changes: load_experiment(written(tmp_path, STUDY, *changes))
 
 
 def page(findings, out) -> str:
@@ -350,15 +341,7 @@ def test_operators_and_factors_compare_as_they_say():
 @pytest.fixture
 def with_grid(study):
     """The study with a grid of its four runs, derived numbers and claims about them."""
-
-    def load(*changes):
-        return study(
-            ("claims:\n", GRID + "claims:\n"),
-            ("checks:\n", CHECKS),
-            *changes,
-        )
-
-    return load
+    return lambda *changes: study(("claims:\n", GRID + "claims:\n"), ("checks:\n", CHECKS), *changes)
 
 
 GRID = """\

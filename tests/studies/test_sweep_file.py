@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from tests.changed import changed
-from tests.refusals import mentions, texts_of
+from tests.refusals import mentions, refused, texts_of
+from tests.studies.experiment_files import written
 from yawbench.foundation.errors import ScenarioError
 from yawbench.studies.axes import AxisSpec, level_at
 from yawbench.studies.experiment import plan_experiment
@@ -49,17 +50,10 @@ metrics:
 
 @pytest.fixture
 def sweep(tmp_path):
-    """Write a sweep file with lines replaced and return it as loaded."""
+    """Write a sweep file with texts replaced and return it as loaded."""
 
     def make(*changes, text=SWEEP):
-        (tmp_path / "half.yaml").write_text(SCENARIO)
-        (tmp_path / "car.yaml").write_text(CAR)
-        (tmp_path / "heavy.yaml").write_text(HEAVY)
-        for old, new in changes:
-            assert old in text
-            text = text.replace(old, new)
-        (tmp_path / "sweep.yaml").write_text(text)
-        return load_experiment(tmp_path / "sweep.yaml")
+        return load_experiment(written(tmp_path, text, *changes, half=SCENARIO, car=CAR, heavy=HEAVY))
 
     return make
 
@@ -258,7 +252,7 @@ def test_a_sweep_file_that_is_wrong_is_one_sentence_with_its_place(old, new, nam
         sweep((old, new), text=text)
     assert mentions(error.value, *names)
     assert len(error.value.diagnostics) <= (1 if text == SWEEP else 2)
-    assert all(problem.startswith(f"{tmp_path / 'sweep.yaml'}:") for problem in texts_of(error.value))
+    assert all(problem.startswith(f"{tmp_path / 'experiment.yaml'}:") for problem in texts_of(error.value))
 
 
 PLANS_REFUSED = [
@@ -270,7 +264,7 @@ PLANS_REFUSED = [
     ("scenario: half.yaml", "scenario: hlf.yaml", ("scenario", "file")),
     (AMPLITUDE, "{vary: driver.amplitude, values: [1, 2], unit: km/h}", ("'1 km/h'", "value", "rad")),
     (CONTROL, "{vary: vehicle, values: [heavier.yaml]}", ("vehicle", "file")),
-    ("100 N.m", "100 km/h", ("sweep.yaml", "limits.gentle.holds_if[0]", "'100 km/h'", "N.m", "kN.m")),
+    ("100 N.m", "100 km/h", ("experiment.yaml", "limits.gentle.holds_if[0]", "'100 km/h'", "N.m", "kN.m")),
 ]  # fmt: skip
 
 
@@ -313,6 +307,5 @@ def test_options_change_all_runs_as_the_file_would(sweep, fmus):
 )
 def test_options_that_are_wrong_are_said(options, names, sweep):
     path = sweep().path
-    with pytest.raises(ScenarioError) as error:
+    with refused(ScenarioError, names=names):
         load_experiment(path, changes=changed(**options))
-    assert mentions(str(error.value), *names)

@@ -10,6 +10,7 @@ from lxml import html
 from ruamel.yaml import YAML
 
 from tests.refusals import mentions
+from tests.studies.experiment_files import written
 from yawbench.orchestrator.scenario import yaml_lines
 from yawbench.orchestrator.scenario.schema_validation import validate
 from yawbench.ranking.ranking import EntriesSpec
@@ -51,14 +52,9 @@ UNITS = ("driver_sine",)
 @pytest.fixture
 def tune(fmus, tmp_path, yawbench):
     """Tune, or call another command with, the file with texts replaced."""
-    (tmp_path / "wheel.yaml").write_text(SCENARIO)
-    file = tmp_path / "tuning.yaml"
 
-    def run(command="tune", **other):
-        text = TUNING
-        for old, new in other.items():
-            text = text.replace(old, new)
-        file.write_text(text)
+    def run(*changes, command="tune"):
+        file = written(tmp_path, TUNING, *changes, wheel=SCENARIO)
         return yawbench(command, file, "--out", tmp_path / "out", "--fmus", fmus)
 
     return run
@@ -85,7 +81,7 @@ def test_the_least_of_all_trials_is_found_written_down_and_not_sought_twice(tune
     wanted = {"title": "tuned big wheel", "fmu": "driver_sine", "gains": "tuned", "parameters": made}
     source = entry[1].pop("source")
     assert entry == ("big_wheel_tuned", wanted)
-    assert mentions(source, "tuning.yaml", "10 trials", "seed 2", "1.36e-07", "0.0003239")
+    assert mentions(source, "experiment.yaml", "10 trials", "seed 2", "1.36e-07", "0.0003239")
     found = json.loads((tmp_path / "out/experiment.json").read_text())
     assert [*found["runs"]] == ["turned"]
     page = html.fromstring((tmp_path / "out/report.html").read_text())
@@ -98,29 +94,29 @@ def test_the_least_of_all_trials_is_found_written_down_and_not_sought_twice(tune
 
 
 @pytest.mark.parametrize(
-    ("wrong", "names"),
+    ("old", "new", "names"),
     [
-        ({"objective: miss": "objective: mist"}, ("'mist'", "'miss'")),
-        ({"runs: [turned]": "runs: [burned]"}, ("'burned'", "'turned'")),
-        ({"from: 0.5, to: 5": "values: [1, 2]"}, ("axes.angle", "count")),
-        ({"entries: driver": "entries: wheel"}, ("'big wheel'", "changes", "driver")),
-        ({"swap: {driver: driver_sine}": "stop_time: 1"}, ("'big wheel'", "stop_time")),
-        ({"      swap: {driver: driver_sine}\n": ""}, ("'big wheel'",)),
-        ({"population: 5": "population: 3"}, ("tuning.population",)),
-        ({"tuning:": "axes: {a: {vary: driver.amplitude, values: [1]}}\ntuning:"}, ("axes",)),
+        ("objective: miss", "objective: mist", ("'mist'", "'miss'")),
+        ("runs: [turned]", "runs: [burned]", ("'burned'", "'turned'")),
+        ("from: 0.5, to: 5", "values: [1, 2]", ("axes.angle", "count")),
+        ("entries: driver", "entries: wheel", ("'big wheel'", "changes", "driver")),
+        ("swap: {driver: driver_sine}", "stop_time: 1", ("'big wheel'", "stop_time")),
+        ("      swap: {driver: driver_sine}\n", "", ("'big wheel'",)),
+        ("population: 5", "population: 3", ("tuning.population",)),
+        ("tuning:", "axes: {a: {vary: driver.amplitude, values: [1]}}\ntuning:", ("axes",)),
     ],
 )
-def test_what_is_wrong_with_a_tuning_file_is_said_before_anything_runs(tune, wrong, names):
-    status, out, told = tune(**wrong)
+def test_what_is_wrong_with_a_tuning_file_is_said_before_anything_runs(tune, old, new, names):
+    status, out, told = tune((old, new))
     assert (status, out) == (2, "")
     assert mentions(told, *names)
 
 
 def test_other_commands_say_what_a_tuning_file_is_for_and_tune_what_it_is_not(tune):
     for command in ("study", "run"):
-        status, _, told = tune(command)
+        status, _, told = tune(command=command)
         assert status == 2
         assert mentions(told, "tuning", "`yawbench tune`")
-    status, _, told = tune(**{TUNING.partition("tuning:")[2]: "", "tuning:": ""})
+    status, _, told = tune((TUNING.partition("tuning:")[2], ""), ("tuning:", ""))
     assert (status, told.count("\n")) == (2, 1)
     assert mentions(told, "'tuning'")

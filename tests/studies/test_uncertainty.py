@@ -10,6 +10,7 @@ from scipy import stats
 
 import yawbench as yb
 from tests.refusals import mentions, refused
+from tests.studies.experiment_files import written
 from yawbench.foundation.errors import ResultsError, ScenarioError
 from yawbench.studies import sampling, uncertainty
 from yawbench.studies.load_experiment import load_experiment
@@ -233,18 +234,10 @@ figures:
 
 @pytest.fixture
 def file(tmp_path):
-    def write(*changes):
-        for name in ("dry", "wet"):
-            (tmp_path / f"{name}.yaml").write_text(SCENARIO.format(end=0.3))
-        (tmp_path / "speeds.csv").write_text("speed,share\n60,0\n80,0.7\n120,1\n")
-        text = FILE
-        for old, new in changes:
-            assert old in text
-            text = text.replace(old, new)
-        (tmp_path / "sure.yaml").write_text(text)
-        return tmp_path / "sure.yaml"
-
-    return write
+    """Write the file with texts of it replaced."""
+    (tmp_path / "speeds.csv").write_text("speed,share\n60,0\n80,0.7\n120,1\n")
+    scenario = SCENARIO.format(end=0.3)
+    return lambda *changes: written(tmp_path, FILE, *changes, dry=scenario, wet=scenario)
 
 
 def test_a_file_draws_writes_tables_and_figures_and_its_page_shows_the_points(file, yawbench, tmp_path):
