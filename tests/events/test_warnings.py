@@ -81,15 +81,11 @@ def test_each_limit_is_looked_at(signal, value, code):
     assert list(found(plan(**{signal: {}}), np.full(10, value))) == [code]
 
 
-def test_more_acceleration_than_the_road_gives_is_named():
+def test_more_acceleration_than_the_road_gives_is_named_where_its_friction_is_known():
     made = plan(acceleration_x={}, acceleration_y={})
     one = found(made, np.full(10, 6.0), np.full(10, 8.0))["acceleration-implausible"]
     assert one.value == pytest.approx(10.0 / 9.81 / 0.5)
     assert found(made, np.full(10, 3.0), np.full(10, 4.0)) == {}
-
-
-def test_where_friction_is_no_constant_grip_is_not_judged():
-    made = plan(acceleration_x={}, acceleration_y={})
     road = replace(made, wires=(Wire("road", "friction_fl", "tyre", "friction_fl"),))
     assert found(road, np.full(10, 60.0), np.full(10, 8.0)) == {}
 

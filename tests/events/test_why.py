@@ -40,12 +40,10 @@ HELD, LATE = Proportional(), Proportional(begin=3.0)
 @functools.cache
 def driven(law="off", scenario=SWD, fault=None, **changes):
     """Return the run of a car that is hard to hold, with a law and changes."""
-    vehicle = {"vehicle": "scenarios/vehicles/hard.yaml"} if scenario.startswith(SWD) else {}
     own = {name.replace("__", "."): value for name, value in changes.items()}
-    if law == "off":
-        made = yb.load(scenario).set({**vehicle, **own})
-    else:
-        made = yb.load(scenario).swap(controller=law).set({**vehicle, **LATE_RELEASE, **own})
+    made = yb.load(scenario).set({"vehicle": "scenarios/vehicles/hard.yaml", **own})
+    if law != "off":
+        made = made.swap(controller=law).set({**LATE_RELEASE, **own})
     if fault:
         made = made.fault(fault[0], **dict(fault[1:]))
     with warnings.catch_warnings():
@@ -58,12 +56,7 @@ CAUSES = {
     "wrong sign": (dict(law=Proportional(-1e5)), ("wrong sign",)),
     "late controller": (dict(law=LATE), ("late", "3.00 s")),
     "saturated moment": (dict(law=Proportional(most=700.0)), ("limit", "700 N.m")),
-    "saturated law": (
-        dict(law="controller_fuzzy_sliding_mode", controller__moment_limit=1000),
-        ("limit", "1 kN.m"),
-    ),
     "slow brakes": (dict(law=HELD, wheel_control__pressure_rise_limit=2e6), ("wheels are late",)),
-    "delayed brakes": (dict(law=HELD, wheel_control__pressure_lag=3.0), ("wheels are late",)),
     "moment delayed": (
         dict(law=HELD, fault=("controller.yaw_moment", ("kind", "delay"), ("value", 0.4))),
         ("fault", "controller.yaw_moment"),
@@ -78,9 +71,6 @@ CAUSES = {
     "brakes released": (
         dict(law="controller_pid", wheel_control__release_slip=0.05, wheel_control__full_release_slip=0.1),
         ("released",),
-    ),
-    "lane change too fast": (
-        dict(scenario="proving_ground/iso_3888_2", speed="95 km/h"), ("nothing acts",),
     ),
     "friction falls": (
         dict(scenario=f"{SWD}_split", driver__amplitude="90 deg", road__patches="0.3: x > 50"),

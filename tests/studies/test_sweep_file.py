@@ -221,14 +221,11 @@ REFUSED = [
     ("axes:", "seed: 3\naxes:", ("latin_hypercube", "points", "belong", "design: sobol")),
     ("axes:", "design: sobol\npoints: 4\naxes:", ("design sobol needs seed",)),
     ("axes:", "design: list\naxes:", ("amplitude", "control", "3", "2")),
-    ("axes:", "desing: list\naxes:", ("desing", "'design'")),
-    ("peak(yaw_moment)", "peek(yaw_moment)", ("'peek'", "measure")),
     (AMPLITUDE, "{vary: driver.amplitude, from: 0, to: 1, count: 90000}", ("180000", "100000")),
 ]  # fmt: skip
 FIGURES_REFUSED = [
     ("lines: control", "lines: contrl", ("'contrl'", "'control'")),
     (", lines: control", "", ("'control'", "lines", "panels")),
-    ("metric: moment, x", "metric: momet, x", ("'momet'", "'moment'")),
     ("limit: gentle", "limit: gentel", ("'gentel'", "'gentle'")),
     ("name: two", "name: one", ("'one'",)),
     ("kind: curve", "kind: map", ("map", "y")),

@@ -82,6 +82,8 @@ def test_a_run_that_fails_is_a_row_with_its_reason_and_the_others_are_made(base)
     assert made.table["status"].tolist() == ["failed", "completed"]
     assert mentions(made.table["reason"][0], "float", "division", "zero")
     assert made.runs is None
+    rows = [line for line in made.to_latex(["controller"]).splitlines() if line.endswith(r"\\")]
+    assert rows == [r"controller & status \\", r"careless & failed \\", r"controller\_off & completed \\"]
 
 
 @pytest.mark.parametrize(
@@ -188,13 +190,3 @@ def test_what_a_sample_comes_to_is_a_table_for_latex_per_metric_with_intervals(b
         made.to_latex(of="statistic")
     with refused(yb.ResultsError, "results-missing", names=("drawn",)):
         yb.experiment(base, {"driver.amplitude": [0.02]}, metrics=metrics).run().to_latex(of="statistics")
-
-
-def test_a_table_for_latex_says_which_runs_failed(base):
-    def fails(yaw_rate, limit=1.0):
-        return 0.0 if limit < 2.0 else 1.0 / 0.0
-
-    axes = {"controller.limit": [1.0, 3.0]}
-    made = yb.experiment(base.swap(controller=fails), axes, metrics=["peak(sideslip)"]).run(workers=1)
-    rows = [line for line in made.to_latex(["controller.limit"]).splitlines() if line.endswith(r"\\")]
-    assert rows == [r"controller.limit & status \\", r"1.00 & completed \\", r"3.00 & failed \\"]

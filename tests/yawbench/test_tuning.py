@@ -6,7 +6,6 @@ import csv
 import functools
 import warnings
 from dataclasses import dataclass
-from pathlib import Path
 
 import pytest
 
@@ -83,11 +82,13 @@ def test_parameters_of_plain_python_are_tuned(base, law):
         assert again.run().metric(ERROR) == tuned.objective
 
 
-def test_the_objective_is_a_weighted_sum_averaged_over_scenarios(base):
+def test_the_objective_is_a_weighted_sum_averaged_over_scenarios(base, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     scenarios = [base.swap(controller=Law(1e4)), base.swap(controller=Law(1e4)).set({"speed": "70 km/h"})]
     weights = {ERROR: 2.0, EFFORT: -1e-6}
     ranges = {"controller.gain": (1e3, 1e5), "driver.amplitude": ("1 deg", "2 deg")}
     tuned = yb.tune(scenarios, ranges, weights, **SMALL)
+    assert list(tmp_path.iterdir()) == []  # nothing is written
     assert str(tuned.values["driver.amplitude"]).endswith(" deg")
     runs = [each.set(tuned.values).run() for each in scenarios]
     costs = [sum(weight * run.metric(name) for name, weight in weights.items()) for run in runs]
@@ -157,9 +158,3 @@ def test_wrong_ranges_are_refused_before_a_run(base, ranges, names, monkeypatch)
 def test_what_is_no_metric_is_refused_by_name(base, objective, names):
     with refused(yb.ScenarioError, names=(objective, *names)):
         yb.tune(base, {"driver.amplitude": (0.01, 0.02)}, objective)
-
-
-def test_nothing_is_written(base, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    yb.tune(base, {"driver.amplitude": (0.01, 0.02)}, ERROR, population=5, generations=1)
-    assert list(Path().iterdir()) == []
