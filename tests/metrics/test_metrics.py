@@ -227,11 +227,6 @@ def test_units_of_metrics_follow_from_the_signal():
         assert metric("effort(yaw_rate)").unit(odd) == f"{odd}.s"
 
 
-def test_metrics_find_signals_whatever_the_units_are_called():
-    renamed = results({"Fahrzeug.sideslip": 1.1 * SINE, "soll.sideslip_ref": SINE}, T)
-    assert evaluate_all(renamed)["relative_peak_error(sideslip)"].number == pytest.approx(0.1, rel=1e-6)
-
-
 def test_metrics_without_their_signals_or_relative_to_zero_are_absent():
     alone = {"peak(sideslip)", "stability_index(sideslip)"}
     assert set(evaluate_all(results({"plant.sideslip": SINE}, T))) == alone
@@ -251,12 +246,6 @@ def test_metrics_without_their_signals_or_relative_to_zero_are_absent():
 def test_a_window_limits_a_metric_to_its_samples(name, window, expected):
     found = evaluate(results({"plant.sideslip": T}, T), metric(name), window)
     assert (found and found.number) == (expected and pytest.approx(expected))
-
-
-def test_the_largest_of_four_wheels_counts():
-    columns = {f"actuator.wheel_torque_{w}": k * T for k, w in enumerate(("fl", "fr", "rl", "rr"))}
-    wheels = results(columns, T, dict.fromkeys(columns, "N.m"))
-    assert evaluate(wheels, metric("peak(wheel_torque_*)")).number == pytest.approx(6.0)
 
 
 def test_the_output_that_feeds_an_input_is_the_signal_of_that_name():
@@ -286,13 +275,18 @@ def test_values_in_other_units_are_measured_and_drawn_in_si():
     assert shown_unit("widgets") == ("widgets", 1.0)
 
 
-def test_torque_requests_stand_in_where_no_actuator_is_between():
+def test_metrics_find_signals_whatever_the_units_are_called_and_torques_where_no_actuator_is_between():
+    renamed = results({"Fahrzeug.sideslip": 1.1 * SINE, "soll.sideslip_ref": SINE}, T)
+    assert evaluate_all(renamed)["relative_peak_error(sideslip)"].number == pytest.approx(0.1, rel=1e-6)
     run = car(chatter=100.0)
     asked = evaluate(run, metric("total_variation_rate(torque_request_*)"))
     assert evaluate(run, metric("total_variation_rate(wheel_torque_*)")) == asked
 
 
-def test_of_two_units_with_the_signal_the_plants_counts():
+def test_the_largest_of_four_wheels_counts_and_of_two_units_the_plant():
+    columns = {f"actuator.wheel_torque_{w}": k * T for k, w in enumerate(WHEELS)}
+    wheels = results(columns, T, dict.fromkeys(columns, "N.m"))
+    assert evaluate(wheels, metric("peak(wheel_torque_*)")).number == pytest.approx(6.0)
     both = results({"estimator.sideslip": 0 * T, "plant.sideslip": SINE}, T)
     assert evaluate(both, metric("peak(sideslip)")).number == pytest.approx(1.0)
     assert evaluate(both, metric("peak(estimator.sideslip)")).number == 0.0

@@ -42,12 +42,6 @@ def test_bounds_of_a_share_are_those_of_the_exact_binomial_test(count, number):
     assert share_bounds(count, number) == pytest.approx(tuple(theirs))
 
 
-def test_29_of_29_and_45_of_46_say_that_fewer_than_a_tenth_fail():
-    """One-sided at 95 %: the bound of an interval of 90 %."""
-    assert share_bounds(0, 29, confidence=0.9).high < 0.1 < share_bounds(0, 28, confidence=0.9).high
-    assert share_bounds(1, 46, confidence=0.9).high < 0.1 < share_bounds(1, 45, confidence=0.9).high
-
-
 @pytest.mark.parametrize("count, number", [(-1, 5), (6, 5), (0, 0)])
 def test_a_count_beyond_its_number_is_refused(count, number):
     with pytest.raises(ValueError, match="between 0 and its number"):

@@ -175,15 +175,6 @@ def test_one_row_per_run_with_units_and_figures_and_a_page(moods, yawbench, tmp_
     assert len(list(csv.DictReader((tmp_path / "out" / "table.csv").open()))) == 6
 
 
-@pytest.mark.exhaustive
-def test_the_table_is_the_same_to_the_byte_however_many_workers(moods, yawbench, tmp_path):
-    file = moods(5, 20, count=2)
-    for workers in ("1", "3"):
-        assert yawbench(file, workers, "--jobs", workers)[0] == 1  # level 20 fails
-    tables = {(tmp_path / workers / "table.parquet").read_bytes() for workers in "13"}
-    assert len(tables) == 1
-
-
 def test_a_run_that_fails_is_a_row_with_its_reason_and_is_not_made_again(moods, yawbench, tmp_path):
     file = moods(10, 20)
     status, _, err = yawbench(file, "out")
