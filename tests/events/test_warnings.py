@@ -12,7 +12,7 @@ import pytest
 
 from tests.orchestrator.recorded import car, noted
 from tests.refusals import mentions
-from yawbench.events.kinds import EVENTS, WARNED, WarningWatch
+from yawbench.events.kinds import WarningWatch
 from yawbench.fmus.fmu import Fmu, Variable
 from yawbench.foundation.errors import Diagnostic, Location, warnings_in
 from yawbench.orchestrator.plan import Instance, Plan, Wire
@@ -96,12 +96,6 @@ def test_a_value_outside_what_its_model_states_is_named():
     one = found(made, np.linspace(0.0, 3.0, 101))["range-left"]
     assert mentions(one.message, "plant.pressure", "3", "0.67 s", "2")
     assert found(made, np.linspace(0.0, -1.0, 101))["range-left"].value == pytest.approx(-1.0)
-
-
-def test_every_kind_of_event_says_where_its_limit_comes_from():
-    kinds = (*WARNED, *EVENTS)
-    assert all(kind.why for kind in kinds)
-    assert len({kind.name for kind in kinds}) == len(kinds)
 
 
 def test_a_run_with_findings_is_marked_in_tables():

@@ -167,7 +167,7 @@ def test_the_catalogue_names_every_measure_with_definition_formula_and_unit():
     assert found["overshoot"].needs == "a reference"
 
 
-def test_every_measure_can_be_applied_and_says_its_formula_and_unit():
+def test_every_measure_can_be_applied():
     for name, measure in measures.MEASURES.items():
         if measure.signal:  # of other signals than this car has: tested above
             continue
@@ -176,7 +176,6 @@ def test_every_measure_can_be_applied_and_says_its_formula_and_unit():
         assert value is not None
         assert value.number >= 0 or name in ("final", AT_A_TIME)
         assert "{" not in chosen.formula
-        assert measure.definition
 
 
 def test_every_relation_has_a_kind_and_a_key_of_conditions():
