@@ -71,16 +71,15 @@ def forecast(yawbench, fmus, tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("command", ["study", "sweep"])
 def test_runs_are_to_be_made_until_they_are_made(command, forecast, yawbench, fmus):
-    runs = 2
     before = forecast(command, f"{command}.yaml")
-    assert (before["finished"], before["left"]) == (0, [runs, runs])
+    assert (before["finished"], before["left"]) == (0, [2, 2])
     assert min(before["seconds"]) > 0
     assert min(before["size"]) > 0
     assert yawbench(command, f"{command}.yaml", "--fmus", fmus)[0] == 0
     after = forecast(command, f"{command}.yaml")
-    assert [after.pop(name) for name in ("finished", "left", "seconds", "size")] == [runs, *[[0, 0]] * 3]
+    assert [after.pop(name) for name in ("finished", "left", "seconds", "size")] == [2, *[[0, 0]] * 3]
     again = forecast(command, f"{command}.yaml", "--fresh")
-    assert (again["finished"], again["left"]) == (0, [runs, runs])
+    assert (again["finished"], again["left"]) == (0, [2, 2])
 
 
 def test_a_tuning_takes_its_budget_and_the_runs_beside_it(forecast, yawbench, fmus):

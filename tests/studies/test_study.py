@@ -124,12 +124,6 @@ figures:
     assert mentions(drawn, "controller_made_up", "01234567", "plant_made_up")
 
 
-def judged(claim, values, runs):
-    """Return whether a claim holds, and what was measured in words."""
-    result = ClaimResult.of(claim, "claims", [comparisons(claim, values, runs)], None)
-    return result.verdict.holds, measured_words(result)
-
-
 @pytest.mark.parametrize(
     "value, bound, expected",
     [
@@ -142,12 +136,10 @@ def judged(claim, values, runs):
 def test_numbers_that_decide_a_verdict_read_differently(value, bound, expected):
     condition = {"run": "a", "metric": "far", "below": {"run": "b", "metric": "far"}}
     claim = Claim.model_validate({"says": "Less.", "holds_if": [condition]})
-    found = judged(
-        claim,
-        {("a", "far"): MetricValue(value, "m"), ("b", "far"): MetricValue(bound, "m")},
-        {"a": "held", "b": "free"},
-    )
-    assert found == (value < bound, [expected])
+    values = {(run, "far"): MetricValue(number, "m") for run, number in (("a", value), ("b", bound))}
+    compared = comparisons(claim, values, {"a": "held", "b": "free"})
+    result = ClaimResult.of(claim, "claims", [compared], None)
+    assert (result.verdict.holds, measured_words(result)) == (value < bound, [expected])
 
 
 def test_a_margin_beyond_the_threshold_itself_is_told_in_words():
