@@ -27,7 +27,7 @@ from yawbench.studies.experiment import LoadedExperiment as Design
 from yawbench.studies.experiment import NamedRun, experiment_of, metrics_of, plan_experiment
 from yawbench.studies.experiment_result import ExperimentResult
 from yawbench.studies.jobs import Job, Outcome, measured
-from yawbench.studies.references import problems_of_figure, refuse
+from yawbench.studies.problems import problems_of_figure, refuse
 from yawbench.studies.result_figures import draw_over_axes
 from yawbench.studies.result_files import columns_of
 from yawbench.studies.schema import FigureSpec

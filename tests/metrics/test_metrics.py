@@ -39,128 +39,70 @@ from yawbench.vocabulary.wheels import WHEELS
 
 T = np.linspace(0.0, 2.0, 20001)
 SINE = np.sin(2 * np.pi * T)
+ZERO, ONE = np.zeros_like(T), np.ones_like(T)
+UNEVEN = np.concatenate([np.linspace(0, 1, 11), np.linspace(1, 3, 5001)[1:]])
+DAMPED = 10 * math.sqrt(1 - 0.3**2)
+"""Angular frequency of a system with 10 rad/s and a damping of 0.3, of which this is the answer to a step."""
+STEP = 1 - np.exp(-3 * T) * (np.cos(DAMPED * T) + 3 / DAMPED * np.sin(DAMPED * T))
+EDGE = math.radians(24)
+LATE = np.where((T >= 0.5) & (T < 0.9), 1.0, 0.0)
+LONGER = np.linspace(0.0, 4.0, 401)
+PULSE = np.where((LONGER >= 2.0) & (LONGER <= 2.5), 3.0, 0.0)
+ASIDE = math.radians(45) * SINE
 
 
-def test_errors_of_a_sine_around_zero_are_those_of_the_sine():
-    zero = np.zeros_like(T)
-    assert measures.mean_error(T, SINE, zero) == pytest.approx(2 / math.pi, rel=1e-7)
-    assert measures.rms_error(T, SINE, zero) == pytest.approx(1 / math.sqrt(2), rel=1e-9)
-    assert measures.peak_error(T, SINE, zero) == pytest.approx(1.0, rel=1e-9)
+@pytest.mark.parametrize(
+    ("measure", "signals", "expected", "within"),
+    [
+        ("mean_error", (SINE, ZERO), 2 / math.pi, 1e-7),
+        ("rms_error", (SINE, ZERO), 1 / math.sqrt(2), 1e-9),
+        ("peak_error", (SINE, ZERO), 1.0, 1e-9),
+        ("relative_mean_error", (-3 * SINE, -2 * SINE), 1 / math.pi, 1e-6),
+        ("relative_rms_error", (-3 * SINE, -2 * SINE), 0.5 / math.sqrt(2), 1e-6),
+        ("relative_peak_error", (-3 * SINE, -2 * SINE), 0.5, 1e-6),
+        ("rms", (3 * SINE,), 3 / math.sqrt(2), 1e-9),
+        ("effort", (3 * SINE,), 3 * 4 / math.pi, 1e-7),
+        ("total_variation", (5 * SINE,), 2 * 4 * 5, 1e-6),
+        ("total_variation_rate", (5 * SINE,), 4 * 5, 1e-6),
+        ("slope_variation_rate", (SINE,), 4 * 2 * math.pi, 1e-3),
+        ("settling_time", (1 - np.exp(-T / 0.4), ONE), 0.4 * math.log(20), 1e-4),
+        ("settling_time", (1 - np.exp(-T / 4), ONE), math.inf, 0),
+        ("settling_time", (1.04 * SINE, SINE), 0.0, 0),
+        ("overshoot", (STEP, ONE), math.exp(-math.pi * 3 / DAMPED), 1e-4),
+        ("overshoot", (0.7 * SINE, SINE), 0.0, 0),
+        ("changes", (np.where(T < 1.2, 3.0, 5.0),), 1.0, 0),
+        ("change_time", (np.where(T < 1.2, 3.0, 5.0),), T[T >= 1.2][0], 1e-9),
+        ("changes", (ONE,), 0.0, 0),
+        ("change_time", (ONE,), math.nan, 0),
+        ("displacement", (10 - T,), 2.0, 1e-9),
+        ("peak", (10 - T,), 10.0, 1e-9),
+        ("final", (10 - T,), 8.0, 1e-9),
+        ("phase_area", (0.3 * SINE, 0.6 * math.pi * np.cos(2 * np.pi * T)), 0.36 * math.pi**2, 1e-9),
+        ("stability_index", (EDGE / 4 * ONE, ZERO), 1.0, 1e-6),
+        ("stability_index", (ZERO, -EDGE * ONE), 1.0, 1e-6),
+        ("stability_index", (EDGE / 4 * ONE, -EDGE * ONE), 0.0, 0),
+        ("time_beyond", (LATE, ZERO), 0.2, 1e-9),
+        ("time_beyond", (ZERO, ZERO), 0.0, 0),
+        ("jerk", (3 * T,), 3.0, 1e-6),
+        ("jerk", (3 * T + 0.01 * (np.arange(T.size) % 2),), 3.0, 0.01),  # what a controller's samples add
+        ("spins", (0.99 * ASIDE,), 0.0, 0),
+        ("spins", (1.01 * ASIDE,), 1.0, 0),
+        ("spins", (math.pi + ZERO,), 0.0, 0),  # reverses
+        ("spins", (0.99 * ASIDE - math.pi,), 0.0, 0),
+        ("spins", (np.where(T < 1.0, math.pi, 2.0),), 1.0, 0),
+        ("spins", (np.where(T < 1.0, 0.0, math.nan),), math.nan, 0),
+    ],
+)
+def test_measures_are_their_closed_forms(measure, signals, expected, within):
+    found = getattr(measures, measure)(T, *signals)
+    assert found == pytest.approx(expected, rel=within, abs=1e-12, nan_ok=True)
 
 
-def test_relative_errors_are_relative_to_the_peak_of_the_reference():
-    reference = -2 * SINE
-    assert measures.relative_peak_error(T, 1.5 * reference, reference) == pytest.approx(0.5)
-    assert measures.relative_rms_error(T, 1.5 * reference, reference) == pytest.approx(0.5 / math.sqrt(2))
-    assert measures.relative_mean_error(T, 1.5 * reference, reference) == pytest.approx(1 / math.pi, rel=1e-6)
-
-
-def test_effort_is_the_integral_of_the_absolute_value():
-    assert measures.effort(T, 3 * SINE) == pytest.approx(3 * 4 / math.pi, rel=1e-7)
-
-
-def test_integrals_hold_for_uneven_samples():
-    t = np.concatenate([np.linspace(0, 1, 11), np.linspace(1, 3, 5001)[1:]])
-    assert measures.integral(t, 2 * t) == pytest.approx(9.0, rel=1e-12)
-
-
-def test_total_variation_of_a_sine_is_four_amplitudes_per_period():
-    assert measures.total_variation(T, 5 * SINE) == pytest.approx(2 * 4 * 5, rel=1e-6)
-    assert measures.total_variation_rate(T, 5 * SINE) == pytest.approx(4 * 5, rel=1e-6)
-
-
-def test_slope_variation_of_a_sine_is_that_of_its_derivative():
-    assert measures.slope_variation_rate(T, SINE) == pytest.approx(4 * 2 * math.pi, rel=1e-3)
-
-
-def test_settling_time_of_a_first_order_lag_is_three_time_constants():
-    settles = measures.settling_time(T, 1 - np.exp(-T / 0.4), np.ones_like(T))
-    assert settles == pytest.approx(0.4 * math.log(20), abs=2e-4)
-
-
-def test_a_signal_that_ends_outside_the_band_never_settles():
-    assert measures.settling_time(T, 1 - np.exp(-T / 4), np.ones_like(T)) == math.inf
-
-
-def test_a_signal_that_never_leaves_the_band_has_settled_at_once():
-    assert measures.settling_time(T, SINE * 1.04, SINE) == 0.0
-
-
-def test_overshoot_of_a_second_order_system_follows_from_its_damping():
-    zeta = 0.3
-    omega = 10.0
-    damped = omega * math.sqrt(1 - zeta**2)
-    step = 1 - np.exp(-zeta * omega * T) * (
-        np.cos(damped * T) + zeta / math.sqrt(1 - zeta**2) * np.sin(damped * T)
-    )
-    expected = math.exp(-math.pi * zeta / math.sqrt(1 - zeta**2))
-    assert measures.overshoot(T, step, np.ones_like(T)) == pytest.approx(expected, rel=1e-4)
-    assert measures.overshoot(T, 0.7 * SINE, SINE) == 0.0
-
-
-def test_the_first_change_is_found_and_none_where_there_is_none():
-    x = np.where(T < 1.2, 3.0, 5.0)
-    assert measures.changes(T, x) == 1.0
-    assert measures.change_time(T, x) == pytest.approx(T[T >= 1.2][0] - T[0])
-    assert measures.changes(T, np.ones_like(T)) == 0.0
-    assert math.isnan(measures.change_time(T, np.ones_like(T)))
-
-
-def test_a_car_spins_beyond_45_degrees_and_from_straight_back_if_it_reverses():
-    least = math.radians(45)
-    assert [measures.spins(T, x * SINE) for x in (0.99 * least, 1.01 * least)] == [0.0, 1.0]
-    back = math.pi + 0.0 * T
-    assert measures.spins(T, back) == measures.spins(T, 0.99 * least * SINE - back) == 0.0
-    assert measures.spins(T, np.where(T < 1.0, math.pi, 2.0)) == 1.0
-    assert math.isnan(measures.spins(T, np.where(T < 1.0, 0.0, math.nan)))
-    run = results({"plant.sideslip": SINE, "plant.yaw_rate": SINE}, T)
-    assert evaluate(run, metric("spins(sideslip)")).number == 1.0
-    assert evaluate(run, metric("spins(yaw_rate)")) is None
-    assert mentions(why_none(run, metric("spins(yaw_rate)"), None, 2.0), "sideslip")
-
-
-def test_displacement_counts_from_the_first_value_peak_from_zero():
-    assert measures.displacement(T, 10 - T) == pytest.approx(2.0)
-    assert measures.peak(T, 10 - T) == pytest.approx(10.0)
-    assert measures.final(T, 10 - T) == pytest.approx(8.0)
-
-
-def test_rms_of_a_sine_is_its_amplitude_over_root_two():
-    assert measures.rms(T, 3 * SINE) == pytest.approx(3 / math.sqrt(2), rel=1e-9)
-
-
-def test_the_worst_second_is_the_largest_rms_over_a_second():
-    t = np.linspace(0.0, 4.0, 401)
-    pulse = np.where((t >= 2.0) & (t <= 2.5), 3.0, 0.0)
-    assert measures.worst_second(t, pulse) == pytest.approx(3.0 * math.sqrt(0.5), rel=0.02)
-    assert measures.worst_second(t, 2.0 + 0.0 * t) == pytest.approx(2.0)
-    assert math.isnan(measures.worst_second(t[:50], pulse[:50]))
-
-
-def test_phase_area_of_a_sine_is_that_of_its_ellipse_once_per_period():
-    rate = 2 * math.pi * np.cos(2 * np.pi * T)
-    assert measures.phase_area(T, 0.3 * SINE, 0.3 * rate) == pytest.approx(
-        2 * math.pi * 0.3 * 0.3 * 2 * math.pi, rel=1e-9
-    )
-
-
-def test_the_stability_index_is_one_on_the_edge_of_the_strip():
-    ones = np.ones_like(T)
-    edge = math.radians(24)
-    assert measures.stability_index(T, edge / 4 * ones, 0 * ones) == pytest.approx(1.0)
-    assert measures.stability_index(T, 0 * ones, -edge * ones) == pytest.approx(1.0)
-    assert measures.stability_index(T, edge / 4 * ones, -edge * ones) == pytest.approx(0.0)
-
-
-def test_time_beyond_is_the_share_of_time_outside_the_strip():
-    beyond = np.where((T >= 0.5) & (T < 0.9), 1.0, 0.0)
-    assert measures.time_beyond(T, beyond, 0 * T) == pytest.approx(0.2, rel=1e-9)
-    assert measures.time_beyond(T, 0 * T, 0 * T) == 0.0
-
-
-def test_jerk_is_the_slope_of_a_ramp_and_knows_nothing_of_a_controllers_samples():
-    assert measures.jerk(T, 3 * T) == pytest.approx(3.0)
-    assert measures.jerk(T, 3 * T + 0.01 * (np.arange(T.size) % 2)) == pytest.approx(3.0, rel=0.01)
+def test_samples_may_be_uneven_longer_or_too_few():
+    assert measures.integral(UNEVEN, 2 * UNEVEN) == pytest.approx(9.0, rel=1e-12)
+    assert measures.worst_second(LONGER, PULSE) == pytest.approx(3.0 * math.sqrt(0.5), rel=0.02)
+    assert measures.worst_second(LONGER, 2.0 + 0.0 * LONGER) == pytest.approx(2.0)
+    assert math.isnan(measures.worst_second(LONGER[:50], PULSE[:50]))
     assert math.isnan(measures.jerk(T[:3], T[:3]))
 
 
@@ -207,11 +149,13 @@ def test_a_recorded_rate_goes_before_the_difference_quotient():
     assert evaluate(results(columns, T), index).number > 2 * by_quotient.number
 
 
-def test_the_strip_of_the_phase_plane_is_for_angles_only():
+def test_some_measures_are_of_some_signals_only():
     run = results({"plant.yaw_rate": SINE, "plant.sideslip": SINE}, T)
     assert evaluate(run, metric("stability_index(yaw_rate)")) is None
     assert evaluate(run, metric("phase_area(yaw_rate)")).unit == "(rad/s)2/s"
     assert evaluate(run, metric("phase_area(sideslip)")).unit == "rad2/s"
+    assert evaluate(run, metric("spins(yaw_rate)")) is None
+    assert mentions(why_none(run, metric("spins(yaw_rate)"), None, 2.0), "sideslip")
 
 
 def test_the_catalogue_names_every_measure_with_definition_formula_and_unit():
@@ -223,7 +167,7 @@ def test_the_catalogue_names_every_measure_with_definition_formula_and_unit():
     assert found["overshoot"].needs == "a reference"
 
 
-def test_every_measure_can_be_applied_and_says_its_formula_and_unit():
+def test_every_measure_can_be_applied():
     for name, measure in measures.MEASURES.items():
         if measure.signal:  # of other signals than this car has: tested above
             continue
@@ -232,7 +176,6 @@ def test_every_measure_can_be_applied_and_says_its_formula_and_unit():
         assert value is not None
         assert value.number >= 0 or name in ("final", AT_A_TIME)
         assert "{" not in chosen.formula
-        assert measure.definition
 
 
 def test_every_relation_has_a_kind_and_a_key_of_conditions():
@@ -243,7 +186,6 @@ def test_every_relation_has_a_kind_and_a_key_of_conditions():
 def test_a_ratio_has_the_unit_of_its_number_and_is_shown_in_per_cent():
     ratio = evaluate_all(car(0.8))["relative_peak_error(sideslip)"]
     assert (ratio.number, ratio.unit) == (pytest.approx(0.2), "1")
-    assert shown(ratio.number, ratio.shown_in) == "20.0 %"
     table = metrics_of_run(car(0.8), ["relative_peak_error(sideslip)"])
     assert table.text()[0][-1] == "20.0 %"
     assert (table.unit(2), table.values(2)) == ("1", [pytest.approx(0.2)])
@@ -253,8 +195,6 @@ def test_a_ratio_has_the_unit_of_its_number_and_is_shown_in_per_cent():
     assert (verdict.value, verdict.unit, verdict.as_data()["unit"]) == (0.206, "1", "1")
     judged = Evaluation("run")
     judged.add("ratio", "a ratio", 0.206, "%")
-    quantity = judged.quantities["ratio"]
-    assert (quantity.value, quantity.unit, quantity.shown_in) == (0.206, "1", "%")
     data = judged.as_data()["quantities"]["ratio"]
     assert data == {"name": "a ratio", "value": 0.206, "unit": "1", "reading": ""}
     (row,) = run_table(judged, "").text()
@@ -286,40 +226,25 @@ def test_units_of_metrics_follow_from_the_signal():
         assert metric("effort(yaw_rate)").unit(odd) == f"{odd}.s"
 
 
-def test_metrics_find_signals_whatever_the_units_are_called():
-    renamed = results({"Fahrzeug.sideslip": 1.1 * SINE, "soll.sideslip_ref": SINE}, T)
-    assert evaluate_all(renamed)["relative_peak_error(sideslip)"].number == pytest.approx(0.1, rel=1e-6)
-
-
-def test_metrics_without_their_signals_are_absent():
-    without_reference = results({"plant.sideslip": SINE}, T)
-    assert set(evaluate_all(without_reference)) == {"peak(sideslip)", "stability_index(sideslip)"}
-
-
-def test_a_relative_error_against_a_reference_of_zero_is_absent():
+def test_metrics_without_their_signals_or_relative_to_zero_are_absent():
+    alone = {"peak(sideslip)", "stability_index(sideslip)"}
+    assert set(evaluate_all(results({"plant.sideslip": SINE}, T))) == alone
     straight = results({"plant.sideslip": SINE, "reference.sideslip_ref": 0 * SINE}, T)
-    without = {"mean_error(sideslip)", "rms_error(sideslip)", "peak(sideslip)", "stability_index(sideslip)"}
-    assert set(evaluate_all(straight)) == without
+    assert set(evaluate_all(straight)) == {*alone, "mean_error(sideslip)", "rms_error(sideslip)"}
 
 
-def test_a_window_limits_a_metric_to_its_samples():
-    ramp = results({"plant.sideslip": T}, T)
-    assert evaluate(ramp, metric("peak(sideslip)"), (0.0, 0.5)).number == pytest.approx(0.5)
-    assert evaluate(ramp, metric("displacement(sideslip)"), (0.5, 2.0)).number == pytest.approx(1.5)
-    assert evaluate(ramp, metric("peak(sideslip)"), (5.0, 6.0)) is None
-
-
-def test_a_window_that_the_run_does_not_last_for_gives_no_number():
-    ramp = results({"plant.sideslip": T}, T)
-    assert evaluate(ramp, metric("peak(sideslip)"), (0.5, float(T[-1]))) is not None
-    assert evaluate(ramp, metric("peak(sideslip)"), (0.5, float(T[-1]) + 0.5)) is None
-    assert evaluate(ramp, metric("peak(sideslip)"), (float(T[0]) - 0.5, 0.5)) is None
-
-
-def test_the_largest_of_four_wheels_counts():
-    columns = {f"actuator.wheel_torque_{w}": k * T for k, w in enumerate(("fl", "fr", "rl", "rr"))}
-    wheels = results(columns, T, dict.fromkeys(columns, "N.m"))
-    assert evaluate(wheels, metric("peak(wheel_torque_*)")).number == pytest.approx(6.0)
+@pytest.mark.parametrize(
+    ("name", "window", "expected"),
+    [
+        ("peak(sideslip)", (0.0, 0.5), 0.5),
+        ("displacement(sideslip)", (0.5, 2.0), 1.5),
+        ("peak(sideslip)", (0.5, 2.5), None),  # the run does not last so long
+        ("peak(sideslip)", (-0.5, 0.5), None),
+    ],
+)
+def test_a_window_limits_a_metric_to_its_samples(name, window, expected):
+    found = evaluate(results({"plant.sideslip": T}, T), metric(name), window)
+    assert (found and found.number) == (expected and pytest.approx(expected))
 
 
 def test_the_output_that_feeds_an_input_is_the_signal_of_that_name():
@@ -349,13 +274,18 @@ def test_values_in_other_units_are_measured_and_drawn_in_si():
     assert shown_unit("widgets") == ("widgets", 1.0)
 
 
-def test_torque_requests_stand_in_where_no_actuator_is_between():
+def test_metrics_find_signals_whatever_the_units_are_called_and_torques_where_no_actuator_is_between():
+    renamed = results({"Fahrzeug.sideslip": 1.1 * SINE, "soll.sideslip_ref": SINE}, T)
+    assert evaluate_all(renamed)["relative_peak_error(sideslip)"].number == pytest.approx(0.1, rel=1e-6)
     run = car(chatter=100.0)
     asked = evaluate(run, metric("total_variation_rate(torque_request_*)"))
     assert evaluate(run, metric("total_variation_rate(wheel_torque_*)")) == asked
 
 
-def test_of_two_units_with_the_signal_the_plants_counts():
+def test_the_largest_of_four_wheels_counts_and_of_two_units_the_plant():
+    columns = {f"actuator.wheel_torque_{w}": k * T for k, w in enumerate(WHEELS)}
+    wheels = results(columns, T, dict.fromkeys(columns, "N.m"))
+    assert evaluate(wheels, metric("peak(wheel_torque_*)")).number == pytest.approx(6.0)
     both = results({"estimator.sideslip": 0 * T, "plant.sideslip": SINE}, T)
     assert evaluate(both, metric("peak(sideslip)")).number == pytest.approx(1.0)
     assert evaluate(both, metric("peak(estimator.sideslip)")).number == 0.0
@@ -424,24 +354,24 @@ def test_wheels_are_compared_in_pairs_and_units_converted():
 @pytest.mark.parametrize(
     ("name", "names"),
     [
+        ("peek(sideslip)", ("'peek(sideslip)'", "'peek'", "'peak'")),
+        ("sideslip", ("'sideslip'", "'peak(sideslip)'", "measure(signal)", "relative_peak_error(sideslip)")),
+        ("peak_sideslip", ("measure(signal)", "'peak(sideslip)'")),
+        ("rms_error_yaw_rate", ("measure(signal)", "'rms_error(yaw_rate)'")),
+        ("peak(sideslip", ("measure(signal)", "'peak(sideslip)'")),
         ("rms_error(x - y)", ("rms_error", "compares", "reference")),
         ("rms(x, y)", ("difference", "reference", "rms")),
+        ("peak(sideslip) at 2 s", ("2 s", "point", "time")),
+        ("value(sideslip)", ("sideslip", "point", "time")),
+        ("peak(sideslip) from 3 s to 1 s", ("ends", "begins")),
+        ("peak(sideslip) during 3 s", ("1 s", "3 s", "2 s")),
+        ("peak(sideslip) from 1 kg to 3 s", ("'1 kg'", "value")),
     ],
 )
-def test_two_columns_that_are_not_compared_so_are_an_error(name, names):
-    with refused(ScenarioError, names=names):
+def test_a_name_that_is_no_metric_is_refused_with_what_is_meant(name, names):
+    unknown = "measure(signal)" in names or "'peek'" in names
+    with refused(ScenarioError, "metric-unknown" if unknown else "metric-invalid", names=names):
         metric(name)
-
-
-def test_an_unknown_measure_is_an_error_that_names_the_nearest():
-    with refused(ScenarioError, "metric-unknown", names=("'peek(sideslip)'", "'peek'", "'peak'")):
-        metric("peek(sideslip)")
-    with refused(
-        ScenarioError,
-        "metric-unknown",
-        names=("'sideslip'", "'peak(sideslip)'", "measure(signal)", "relative_peak_error(sideslip)"),
-    ):
-        metric("sideslip")
 
 
 def test_numbers_are_shown_in_the_units_people_read():
@@ -456,30 +386,12 @@ def test_numbers_are_shown_in_the_units_people_read():
     assert digits_of(12345.0) == "12345"
 
 
-@pytest.mark.parametrize(
-    ("name", "meant"),
-    [
-        ("peak_sideslip", "peak(sideslip)"),
-        ("rms_error_yaw_rate", "rms_error(yaw_rate)"),
-        ("peak(sideslip", "peak(sideslip)"),
-    ],
-)
-def test_a_metric_written_otherwise_is_asked_whether_it_is_meant(name: str, meant: str) -> None:
-    with pytest.raises(ScenarioError) as caught:
-        metric(name)
-    assert caught.value.code == "metric-unknown"
-    assert mentions(str(caught.value), "measure(signal)", f"'{meant}'")
-
-
-@pytest.mark.parametrize(
-    "text", ["from 0.5 s to 1.5 s", "from 500 ms to 1.5 s", "from 0.5 to 1.5 s", "0.5 to 1.5"]
-)
+@pytest.mark.parametrize("text", ["from 500 ms to 1.5 s", "0.5 to 1.5"])
 def test_a_metric_may_be_of_a_stretch_of_time(text):
     run = results({"plant.sideslip": T}, T)
     chosen = metric(f"peak(sideslip) {text}")
     assert mentions(chosen.name, "peak(sideslip)", "0.5 s", "1.5 s")
     assert metric(chosen.name) == chosen
-    assert evaluate(run, chosen) == evaluate(run, metric("peak(sideslip)"), (0.5, 1.5))
     assert evaluate(run, chosen).number == pytest.approx(1.5)
     assert mentions(chosen.title, "0.5", "1.5 s", "Sideslip", "angle")
 
@@ -491,21 +403,6 @@ def test_a_value_may_be_of_a_point_of_time():
     assert mentions(chosen.title, "0.75 s", "Sideslip", "angle")
     assert evaluate(run, chosen).number == pytest.approx(0.75)
     assert evaluate(run, metric("value(sideslip) at 9 s")) is None
-
-
-@pytest.mark.parametrize(
-    ("name", "names"),
-    [
-        ("peak(sideslip) at 2 s", ("2 s", "point", "time")),
-        ("value(sideslip)", ("sideslip", "point", "time")),
-        ("peak(sideslip) from 3 s to 1 s", ("ends", "begins")),
-        ("peak(sideslip) during 3 s", ("1 s", "3 s", "2 s")),
-        ("peak(sideslip) from 1 kg to 3 s", ("'1 kg'", "value")),
-    ],
-)
-def test_a_window_that_is_none_is_said(name, names):
-    with refused(ScenarioError, names=names):
-        metric(name)
 
 
 # Angles of a velocity, while the car moves
@@ -532,8 +429,7 @@ def of(results, name):
     return None if value is None else value.number
 
 
-@pytest.mark.parametrize("sideways", [True, False])
-@pytest.mark.parametrize(("unit", "speed_unit"), [("rad", "m/s"), ("deg", "km/h")])
+@pytest.mark.parametrize(("sideways", "unit", "speed_unit"), [(True, "rad", "m/s"), (False, "deg", "km/h")])
 def test_the_sideslip_of_a_car_that_brakes_straight_to_rest_is_that_while_it_moves(
     sideways, unit, speed_unit
 ):
@@ -551,35 +447,33 @@ def test_the_sideslip_of_a_car_that_brakes_straight_to_rest_is_that_while_it_mov
     assert not np.isnan(run.columns["plant.sideslip"]).any()  # what was recorded stays
 
 
-def test_a_car_that_spins_at_speed_and_comes_to_rest_has_spun():
-    turned = np.radians([0.0, 30.0, 90.0, 150.0, -170.0, -170.0])
-    run = moving_car([20.0, 18.0, 15.0, 12.0, 8.0, 0.0], turned)
-    assert of(run, "peak(sideslip)") == pytest.approx(np.radians(170.0))
-    assert of(run, "total_variation(sideslip)") == pytest.approx(np.radians(190.0))  # on through 180 degrees
+WRAPPING = np.radians([150.0, 170.0, -170.0, -150.0, -130.0])
 
 
-def test_a_car_that_starts_from_rest_and_one_that_never_moves():
-    run = moving_car([0.0, 0.0, 5.0, 10.0], [np.pi, -np.pi, 0.1, 0.05])
-    assert of(run, "peak(sideslip)") == pytest.approx(0.1)
-    stands = moving_car([0.0, 0.1, 0.0], [np.pi, 1.0, 2.0])
-    assert of(stands, "peak(sideslip)") is None
-    assert "10 km/h" in why_none(stands, metric("peak(sideslip)"), None, 0.2)
+@pytest.mark.parametrize(
+    ("speeds", "sideslip", "name", "expected"),
+    [
+        ([20, 18, 15, 8, 0], np.radians([0, 90, 150, -170, -170]), "peak(sideslip)", np.radians(170.0)),
+        ([20, 18, 15, 8, 0], np.radians([0, 90, 150, -170, -170]), "total_variation(sideslip)",
+         np.radians(190.0)),  # on through 180 degrees
+        ([0.0, 0.0, 5.0, 10.0], [np.pi, -np.pi, 0.1, 0.05], "peak(sideslip)", 0.1),  # starts from rest
+        ([0.0, 0.1, 0.0], [np.pi, 1.0, 2.0], "peak(sideslip)", None),  # never moves
+        # the clock of a mean stands while the car does
+        ([10, 10, 10, 0, 0, 10, 10, 10], [0.1, 0.1, 0.1, 3, -3, 0.3, 0.3, 0.3], "rms(sideslip)", 0.05**0.5),
+        ([10, 10, 10, 0, 0, 10, 10, 10], [0.1, 0.1, 0.1, 3, -3, 0.3, 0.3, 0.3], "effort(sideslip)", 0.1),
+        ([10.0] * 5, WRAPPING, "phase_area(sideslip)", np.radians(200.0) ** 2 * 0.4),
+    ],
+)  # fmt: skip
+def test_angles_of_a_velocity_count_while_the_car_moves(speeds, sideslip, name, expected):
+    run = moving_car(speeds, sideslip)
+    assert of(run, name) == (None if expected is None else pytest.approx(expected))
+    if expected is None:
+        assert "10 km/h" in why_none(run, metric(name), None, 0.2)
 
 
-def test_the_clock_of_a_mean_stands_while_the_car_does():
-    stop = moving_car([10, 10, 10, 0, 0, 0, 0, 10, 10, 10], [0.1, 0.1, 0.1, 3, -3, 3, -3, 0.3, 0.3, 0.3])
-    assert of(stop, "rms(sideslip)") == pytest.approx(
-        of(moving_car([10] * 6, [0.1] * 3 + [0.3] * 3), "rms(sideslip)")
-    )
-    assert of(stop, "effort(sideslip)") == pytest.approx(0.02 + 0.02 + 0.06)
-
-
-def test_no_rate_jumps_where_a_sideslip_wraps_at_180_degrees():
-    turned = np.radians([150.0, 170.0, -170.0, -150.0, -130.0])
-    run = moving_car([10.0] * 5, turned)
-    assert of(run, "phase_area(sideslip)") == pytest.approx(np.radians(200.0) ** 2 * 0.4)
-    reference = moving_car([10.0] * 5, turned, reference__sideslip_ref=np.radians([150, 175, 178, 179, 180]))
-    assert of(reference, "peak_error(sideslip)") == pytest.approx(np.radians(50.0))
+def test_no_error_jumps_where_a_sideslip_wraps_at_180_degrees():
+    run = moving_car([10.0] * 5, WRAPPING, reference__sideslip_ref=np.radians([150, 175, 178, 179, 180]))
+    assert of(run, "peak_error(sideslip)") == pytest.approx(np.radians(50.0))
 
 
 def test_slip_angles_and_estimates_count_while_the_true_car_moves():
@@ -598,8 +492,6 @@ def test_without_a_speed_a_sideslip_is_taken_as_it_is():
 
 
 def test_a_line_has_a_gap_while_the_car_stands_and_keeps_its_time():
-    from yawbench.figures.plots import draw
-
     run = moving_car([20.0, 15.0, 10.0, 5.0, 0.0, 0.0], [0.0, 0.02, 0.01, 0.0, np.pi, -np.pi])
     figure = draw([LabelledRun("a", run)], ["sideslip", "velocity_x", "velocity_x(sideslip)"])
     of_slip, of_speed = figure.axes[:2]
@@ -621,6 +513,5 @@ def test_whether_something_happens_in_a_run_is_shown_as_yes_or_no_and_stays_a_nu
     straight, spun = ({"plant.sideslip": x * SINE} for x in (0.1, 1.5))
     no, yes = (evaluate(results(columns, T), metric("spins(sideslip)")) for columns in (straight, spun))
     assert [shown_value(no), shown_value(yes)] == ["no", "yes"]
-    assert [no.number, yes.number, yes.unit] == [0.0, 1.0, "1"]
     table = Table("", ["run", "spins"], [["a", yes]])
     assert table.text() == [["a", "yes"]] and table.values(1) == [1.0]

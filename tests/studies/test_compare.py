@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -10,7 +11,6 @@ from types import SimpleNamespace
 
 import pytest
 
-from tests.changed import changed
 from tests.orchestrator.recorded import car, write
 from tests.refusals import each_mentions, refused
 from yawbench.commands.recorded_runs import distinct
@@ -50,80 +50,61 @@ def given(job):
     return {str(change.target): change.value for change in job.changes}
 
 
-def labels(scenario, *swaps):
-    return [job.label for job in variants(scenario, swaps, ())]
+@pytest.mark.parametrize(
+    ("swaps", "labels"),
+    [
+        (["controller=a,b, c"], ["a", "b", "c"]),
+        (["controller=a,b,a"], ["a", "b"]),  # runs once
+        (["controller=controller_off"], ["controller_fnn", "controller_off"]),  # beside the scenario's own
+        (["controller=controller_off,controller_off"], ["controller_fnn", "controller_off"]),
+        (["controller=a,b", "tyre=x,y"], ["a + x", "a + y", "b + x", "b + y"]),
+        (["controller=a,b", "tyre=x"], ["a", "b"]),
+        (["controller=old/c.fmu,new/c.fmu"], ["c", "c (2)"]),
+        (["controller={folder}/odd,name.fmu"], ["controller_fnn", "odd,name"]),
+        (["controller=a,a:law=sign:gain=2,b"], ["a", "a law=sign gain=2", "b"]),
+        (["controller=a:gain=20000:law=sign,a:gain=40000:law=sign"], ["gain=20000", "gain=40000"]),
+        (["controller=a:law=x y,a:law=x_y"], ["law=x y", "law=x_y"]),
+        (
+            ["controller=a:law=x y:gain=2,b", "tyre=t,u"],
+            ["a law=x y gain=2 + t", "a law=x y gain=2 + u", "b + t", "b + u"],
+        ),
+    ],
+)
+def test_labels_tell_the_variants_apart_and_folders_too(swaps, labels, scenario, tmp_path):
+    (tmp_path / "odd,name.fmu").touch()
+    jobs = variants(scenario, [swap.format(folder=tmp_path) for swap in swaps], ())
+    assert [job.label for job in jobs] == labels
+    assert len({job.name for job in jobs}) == len(jobs)
+    assert all(re.fullmatch(r"[\w.+=-]+", job.name) for job in jobs)
 
 
-def test_one_run_per_fmu_of_a_list(scenario):
-    jobs = variants(scenario, ["controller=a,b, c"], changed(settings=["plant.mass=2"]))
-    assert [job.label for job in jobs] == ["a", "b", "c"]
-    assert [given(job) for job in jobs] == [{"controller": fmu} for fmu in ("a", "b", "c")]
-    assert [job.name for job in jobs] == ["a", "b", "c"]
-
-
-def test_an_fmu_named_twice_runs_once(scenario):
-    assert labels(scenario, "controller=a,b,a") == ["a", "b"]
-    assert labels(scenario, "controller=controller_off,controller_off") == labels(
-        scenario, "controller=controller_off"
-    )
-
-
-def test_one_fmu_alone_is_compared_with_the_scenarios_own(scenario):
-    assert labels(scenario, "controller=controller_off") == ["controller_fnn", "controller_off"]
-    jobs = variants(scenario, ["tyre=tyre_linear"], ())
-    assert [job.label for job in jobs] == ["tyre_own", "tyre_linear"]
-    assert given(jobs[0]) == {"tyre": str(scenario.parent / "parts/tyre_own.fmu")}
-
-
-def test_lists_for_two_units_are_combined(scenario):
-    assert labels(scenario, "controller=a,b", "tyre=x,y") == ["a + x", "a + y", "b + x", "b + y"]
-    assert labels(scenario, "controller=a,b", "tyre=x") == ["a", "b"]
-
-
-def test_equal_names_of_different_files_stay_apart(scenario):
-    jobs = variants(scenario, ["controller=old/c.fmu,new/c.fmu"], ())
-    assert [job.label for job in jobs] == ["c", "c (2)"]
-    assert len({job.name for job in jobs}) == 2
-
-
-def test_a_file_whose_name_holds_a_comma_is_one_fmu(scenario, tmp_path):
-    odd = tmp_path / "a,b.fmu"
-    odd.touch()
-    assert labels(scenario, f"controller={odd}") == ["controller_fnn", "a,b"]
-
-
-def test_an_fmu_may_bring_parameters_and_so_be_compared_with_itself(scenario):
-    heavier = changed(settings=["plant.mass=2"])
-    jobs = variants(scenario, ["controller=a,a:law=sign:gain=2,b"], heavier)
-    assert [job.label for job in jobs] == ["a", "a law=sign gain=2", "b"]
-    assert [given(job) for job in jobs] == [
-        {"controller": "a"},
-        {"controller": "a", "controller.law": "sign", "controller.gain": 2},
-        {"controller": "b"},
-    ]
-    assert len({job.name for job in jobs}) == 3
-
-
-def test_labels_say_the_values_that_differ_and_folders_can_be_read(scenario):
-    jobs = variants(scenario, ["controller=a:gain=20000:law=sign,a:gain=40000:law=sign"], ())
-    assert [job.label for job in jobs] == ["gain=20000", "gain=40000"]
-    assert [job.name for job in jobs] == ["gain=20000", "gain=40000"]
-    jobs = variants(scenario, ["controller=a:law=x y:gain=2,b", "tyre=t,u"], ())
-    assert [job.label for job in jobs][:2] == ["a law=x y gain=2 + t", "a law=x y gain=2 + u"]
-    assert jobs[0].name == "a_law=x_y_gain=2+t"
-    alike = variants(scenario, ["controller=a:law=x y,a:law=x_y"], ())
-    assert len({job.name for job in alike}) == 2
-
-
-def test_parameters_alone_set_the_scenarios_own_fmu_against_itself(scenario):
-    jobs = variants(scenario, ["controller=controller_fnn:learning=false"], ())
-    own = {"controller": "controller_fnn"}
-    assert [given(job) for job in jobs] == [own, {**own, "controller.learning": False}]
+@pytest.mark.parametrize(
+    ("swap", "changes"),
+    [
+        ("controller=a,b", [{"controller": "a"}, {"controller": "b"}]),
+        ("tyre=tyre_linear", [{"tyre": "{folder}/parts/tyre_own.fmu"}, {"tyre": "tyre_linear"}]),
+        (
+            "controller=a,a:law=sign:gain=2",
+            [{"controller": "a"}, {"controller": "a", "controller.law": "sign", "controller.gain": 2}],
+        ),
+        (  # the scenario's own against itself
+            "controller=controller_fnn:learning=false",
+            [
+                {"controller": "controller_fnn"},
+                {"controller": "controller_fnn", "controller.learning": False},
+            ],
+        ),
+    ],
+)
+def test_a_variant_changes_its_fmu_and_the_parameters_that_this_brings(swap, changes, scenario):
+    own = {"tyre": str(scenario.parent / "parts/tyre_own.fmu")}
+    expected = [own if "{folder}" in str(one) else one for one in changes]
+    assert [given(job) for job in variants(scenario, [swap], ())] == expected
 
 
 def test_a_comparison_with_itself_is_an_error(scenario):
     with refused(ScenarioError, "option-invalid", names=("--swap controller=a", "compare", "controller")):
-        labels(scenario, "controller=controller_fnn")
+        variants(scenario, ["controller=controller_fnn"], ())
 
 
 METRICS = {

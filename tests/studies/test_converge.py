@@ -43,12 +43,9 @@ def made(folder: Path, orders: dict[str, int], halvings: int = 3, scale: float =
 
 def test_observed_orders_are_those_of_the_methods(tmp_path):
     rows = measure(made(tmp_path, {"extrapolated": 2, "gauss_seidel": 1}), SIGNAL)
-    orders = {(row.algorithm, row.step): row.order for row in rows}
-    assert orders["extrapolated", H] == pytest.approx(2.0, abs=1e-9)
-    assert orders["extrapolated", H / 2] == pytest.approx(2.0, abs=1e-9)
-    assert orders["gauss_seidel", H] == pytest.approx(1.0, abs=1e-9)
-    assert orders["extrapolated", H / 4] is None
-    assert orders["gauss_seidel", H / 8] is None
+    approx = pytest.approx
+    assert [row.order for row in rows[:4]] == [approx(2.0, abs=1e-9), approx(2.0, abs=1e-9), None, None]
+    assert [row.order for row in rows[4:]] == [approx(1.0, abs=1e-9), approx(1.0, abs=1e-9), None, None]
 
 
 def test_errors_are_relative_to_the_peak_and_against_the_finest_run_of_the_first_algorithm(tmp_path):
@@ -78,9 +75,9 @@ def test_without_the_finest_run_orders_are_left(tmp_path):
     rows = measure(made(tmp_path, {"extrapolated": 2}, lost=lost), SIGNAL)
     assert [row.error for row in rows] == [None] * 4
     assert rows[0].order == pytest.approx(2.0)
-    orders = [row[2] for row in convergence_table(rows, "title").text()]
-    assert orders[:3] == ["-"] * 3
-    assert mentions(orders[3], "failed", "the process of this run died")
+    *others, finest = (row[2] for row in convergence_table(rows, "title").text())
+    assert others == ["-"] * 3
+    assert mentions(finest, "failed", "the process of this run died")
 
 
 def test_a_signal_that_is_zero_throughout_is_an_error(tmp_path):
@@ -92,13 +89,15 @@ def test_a_signal_that_is_zero_throughout_is_an_error(tmp_path):
 
 
 def test_the_table_says_step_error_order_and_cost(tmp_path):
-    table = convergence_table(measure(made(tmp_path, {"extrapolated": 2}), SIGNAL), "title")
-    assert [row[:2] for row in table.text()] == [
-        ["extrapolated", step] for step in ("40 ms", "20 ms", "10 ms", "5 ms")
-    ]
-    assert [row[3] for row in table.text()] == ["2.00", "2.00", "-", "-"]
-    assert [row[4] for row in table.text()] == ["1.00 s", "2.00 s", "4.00 s", "8.00 s"]
-    assert table.text()[-1][2] == "the finest"
+    rows = convergence_table(measure(made(tmp_path, {"extrapolated": 2}), SIGNAL), "title").text()
+    for column, expected in (
+        (0, ["extrapolated"] * 4),
+        (1, ["40 ms", "20 ms", "10 ms", "5 ms"]),
+        (3, ["2.00", "2.00", "-", "-"]),
+        (4, ["1.00 s", "2.00 s", "4.00 s", "8.00 s"]),
+    ):
+        assert [row[column] for row in rows] == expected
+    assert rows[-1][2] == "the finest"
 
 
 def test_runs_that_do_not_differ_cannot_be_drawn(tmp_path):
@@ -117,26 +116,18 @@ units:
 """
 
 
-def test_steps_are_halved_exactly_and_units_keep_their_own(tmp_path):
+@pytest.mark.parametrize(
+    ("asked", "expected"), [(["extrapolated", "jacobi"],) * 2, ([], ["jacobi"])], ids=["asked for", "default"]
+)
+def test_steps_are_halved_exactly_by_the_algorithms_asked_for_or_the_scenarios_own(asked, expected, tmp_path):
     (tmp_path / "s.yaml").write_text(SCENARIO)
-    experiment = refinements(
-        tmp_path / "s.yaml", halvings=3, signal=SIGNAL, algorithms=["extrapolated", "jacobi"]
-    )
-    jobs = list(experiment.runs.values())
-    assert [job.changes[-1].value for job in jobs] == [0.004, 0.002, 0.001, 0.0005] * 2
-    assert [job.changes[-2].value for job in jobs] == ["extrapolated"] * 4 + ["jacobi"] * 4
-    assert len(jobs) == 8
-
-
-def test_the_scenarios_own_algorithm_is_the_default(tmp_path):
-    (tmp_path / "s.yaml").write_text(SCENARIO)
-    experiment = refinements(tmp_path / "s.yaml", halvings=2, signal=SIGNAL, algorithms=[])
-    assert [job.changes[-2].value for job in experiment.runs.values()] == ["jacobi"] * 3
+    experiment = refinements(tmp_path / "s.yaml", halvings=3, signal=SIGNAL, algorithms=asked)
+    found = [(job.changes[-2].value, job.changes[-1].value) for job in experiment.runs.values()]
+    assert found == [(name, step) for name in expected for step in (0.004, 0.002, 0.001, 0.0005)]
 
 
 def test_a_signal_without_its_unit_is_an_error(tmp_path):
     (tmp_path / "s.yaml").write_text(SCENARIO)
-    with refused(
-        ScenarioError, "option-invalid", names=("--signal yaw_rate", "INSTANCE.VARIABLE", "plant.yaw_rate")
-    ):
+    names = ("--signal yaw_rate", "INSTANCE.VARIABLE", "plant.yaw_rate")
+    with refused(ScenarioError, "option-invalid", names=names):
         refinements(tmp_path / "s.yaml", halvings=2, signal="yaw_rate", algorithms=[])

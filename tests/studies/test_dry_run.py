@@ -16,7 +16,8 @@ from tests.commands.test_batch_commands import SCENARIO, STUDY
 from tests.commands.test_output import ALWAYS, SWEEP, documented
 from tests.ranking.test_ranking import SMALL
 from yawbench.studies.dry_run import Forecast, Span, forecast_table
-from yawbench.studies.journal import records_in
+from yawbench.studies.jobs import MeasuredRun
+from yawbench.studies.journal import Journal, records_in
 
 UNITS = ("driver_sine", "reference_steady_state", "controller_off", "controller_fuzzy_sideslip")
 OPEN = """
@@ -68,24 +69,17 @@ def forecast(yawbench, fmus, tmp_path, monkeypatch):
     return call
 
 
-def made_by(yawbench, fmus, *arguments: str) -> None:
-    status, _, said = yawbench(*arguments, "--fmus", fmus)
-    assert status == 0, said
-
-
-@pytest.mark.parametrize(("command", "runs"), [("study", 2), ("sweep", 2)])
-def test_runs_are_to_be_made_until_they_are_made(command, runs, forecast, yawbench, fmus):
+@pytest.mark.parametrize("command", ["study", "sweep"])
+def test_runs_are_to_be_made_until_they_are_made(command, forecast, yawbench, fmus):
     before = forecast(command, f"{command}.yaml")
-    assert (before["finished"], before["left"]) == (0, [runs, runs])
+    assert (before["finished"], before["left"]) == (0, [2, 2])
     assert min(before["seconds"]) > 0
     assert min(before["size"]) > 0
-    made_by(yawbench, fmus, command, f"{command}.yaml")
+    assert yawbench(command, f"{command}.yaml", "--fmus", fmus)[0] == 0
     after = forecast(command, f"{command}.yaml")
-    assert (after["finished"], after["left"], after["seconds"], after["size"]) == (
-        runs, [0, 0], [0, 0], [0, 0],
-    )  # fmt: skip
+    assert [after.pop(name) for name in ("finished", "left", "seconds", "size")] == [2, *[[0, 0]] * 3]
     again = forecast(command, f"{command}.yaml", "--fresh")
-    assert (again["finished"], again["left"]) == (0, [runs, runs])
+    assert (again["finished"], again["left"]) == (0, [2, 2])
 
 
 def test_a_tuning_takes_its_budget_and_the_runs_beside_it(forecast, yawbench, fmus):
@@ -97,13 +91,15 @@ def test_a_tuning_takes_its_budget_and_the_runs_beside_it(forecast, yawbench, fm
     assert after["left"] == [0, 0]
 
 
-def test_the_journal_that_is_only_read_has_the_runs_of_the_journal(yawbench, fmus, forecast, tmp_path):
-    made_by(yawbench, fmus, "sweep", "sweep.yaml")
-    folder = Path("results") / Path.cwd().name / "sweep"
-    assert len(records_in(folder)) == 2
-    lines = (folder / "runs.jsonl").read_text().splitlines()
-    (folder / "runs.jsonl").write_text("\n".join([lines[0], lines[1], lines[2][:-9], "{"]))
-    assert len(records_in(folder)) == 1  # neither the line that was cut off nor the broken one
+def test_a_journal_that_is_only_read_has_its_whole_lines(tmp_path):
+    journal = Journal(tmp_path, "a/b.yaml")
+    for key in ("one", "two", "three"):
+        journal.add(key, MeasuredRun({"x": (1.0, "s")}))
+    journal.close()
+    assert records_in(tmp_path) == journal.records
+    lines = (tmp_path / "runs.jsonl").read_text().splitlines()
+    (tmp_path / "runs.jsonl").write_text("\n".join([*lines[:2], lines[2][:-9], lines[3]]))
+    assert [*records_in(tmp_path)] == ["one"]  # neither the broken line nor the one that was cut off
     assert records_in(tmp_path / "nothing") == {}
 
 
@@ -134,22 +130,16 @@ def test_a_ranking_is_counted_with_an_assumed_angle_until_it_is_measured(yawbenc
     assert [path.name for path in tmp_path.iterdir()] == ["small.yaml"]
 
 
-@pytest.fixture(scope="module")
-def installed(tmp_path_factory) -> Path:
-    """A copy of the program as a package has it: without a checkout, and without FMUs."""
-    site = tmp_path_factory.mktemp("site")
+@pytest.mark.exhaustive
+def test_outside_a_checkout_dry_runs_work_and_runs_take_the_fmus_of_the_cache(tmp_path):
+    """With a copy of the program as a package has it: without a checkout, and without FMUs."""
+    site, work = tmp_path / "site", tmp_path / "work"
     for name in ("orchestrator", "components", "vocabulary", "scenarios", "yawbench", "fmus"):
         shutil.copytree(ROOT / name, site / name, ignore=shutil.ignore_patterns("__pycache__", "*.fmu"))
-    return site
-
-
-@pytest.mark.exhaustive
-def test_outside_a_checkout_dry_runs_work_and_runs_take_the_fmus_of_the_cache(installed, tmp_path):
-    work = tmp_path / "work"
     work.mkdir()
     (work / "half.yaml").write_text(SCENARIO)
     (work / "sweep.yaml").write_text(SWEEP)
-    environment = os.environ | {"PYTHONPATH": str(installed), "YAWBENCH_CACHE": str(tmp_path / "cache")}
+    environment = os.environ | {"PYTHONPATH": str(site), "YAWBENCH_CACHE": str(tmp_path / "cache")}
 
     def call(*arguments: str) -> tuple[int, str, str]:
         command = (sys.executable, "-m", "yawbench", *arguments)
@@ -162,7 +152,7 @@ def test_outside_a_checkout_dry_runs_work_and_runs_take_the_fmus_of_the_cache(in
     status, out, _ = call("sweep", "sweep.yaml", "--dry-run", "--json")
     assert (status, json.loads(out)["forecasts"][0]["left"]) == (0, [2, 2])
     assert sorted(path.name for path in work.iterdir()) == ["half.yaml", "sweep.yaml"]
-    assert not [*installed.rglob("*.fmu")]
+    assert not [*site.rglob("*.fmu")]
     assert call("sweep", "sweep.yaml", "--no-build")[0] == 0
     status, out, _ = call("sweep", "sweep.yaml", "--dry-run", "--json", "--no-build")
     assert (status, json.loads(out)["forecasts"][0]["finished"]) == (0, 2)

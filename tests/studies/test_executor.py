@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import pytest
 
-from tests.refusals import mentions
+from tests.refusals import refused
 from tests.studies.test_repeats import SCENARIO
 from yawbench.foundation import workers
 from yawbench.foundation.errors import Diagnostic, ResultsError, ScenarioError
@@ -30,6 +30,17 @@ def named_runs(folder):
     return [NamedRun(name, name, name, folder / "gyro.yaml", (change,)) for name, change in given.items()]
 
 
+METRICS = {"last": {"metric": "final(sensor.yaw_rate)"}}
+
+
+def over_gains(folder, *, runs=2, **levels):
+    """Return an experiment of named runs along an axis of gains."""
+    axis = DesignAxisSpec.model_validate({"vary": GAIN, **(levels or {"values": [0.5, 1.0]})})
+    return experiment_of(
+        folder / "e.yaml", named_runs(folder)[:runs], title="t", axes={"g": axis}, metrics=METRICS
+    )
+
+
 def bisected(folder, execute, limit, resolution):
     """Return run -> highest gain with a last value below a limit, and the lowest above, in rounds."""
     runs = named_runs(folder)
@@ -40,7 +51,7 @@ def bisected(folder, execute, limit, resolution):
             experiment_of(
                 folder / "bisection.yaml", runs, title="bisection", design=design,
                 axes={"gain": axis_of_levels(GAIN, [level for _, (level,) in design])},
-                metrics={"last": {"metric": "final(sensor.yaw_rate)"}},
+                metrics=METRICS,
             ),
             keep=False,
         )  # fmt: skip
@@ -93,10 +104,7 @@ def test_rounds_of_a_search_share_their_processes_which_end_with_the_executor(tm
 
 def test_cases_left_out_count_only_if_they_are_finished(executor, tmp_path):
     execute, made = executor()
-    axis = DesignAxisSpec.model_validate({"vary": GAIN, "values": [0.5, 1.0]})
-    metrics = {"last": {"metric": "final(sensor.yaw_rate)"}}
-    runs = named_runs(tmp_path)
-    experiment = experiment_of(tmp_path / "e.yaml", runs, title="t", axes={"g": axis}, metrics=metrics)
+    experiment = over_gains(tmp_path)
     with execute:
         first = execute(experiment, only=lambda case: case.run.name == "slow")
         assert [record.made for record in first.records] == [True, True, False, False]
@@ -116,7 +124,7 @@ def test_plans_of_runs_hold_what_an_experiment_may_depend_on(executor, tmp_path)
             execute.plans([wrong])
 
 
-def bytes_per_run(folder, fmus, monkeypatch, *, few=20, many=70):
+def bytes_per_run(folder, fmus, monkeypatch, *, few=10, many=40):
     """Return how many bytes each run adds to what an experiment holds when all have been planned and made."""
     monkeypatch.setattr("yawbench.studies.on_demand.IN_MEMORY", 1)
     monkeypatch.setattr("os.fsync", lambda file: None)
@@ -126,11 +134,7 @@ def bytes_per_run(folder, fmus, monkeypatch, *, few=20, many=70):
             done(Outcome(job, value=MeasuredRun({"last": (job.plan.time(job.plan.n_steps), "rad/s")})))
 
     def held(count):
-        axis = DesignAxisSpec.model_validate({"vary": GAIN, "from": 0.5, "to": 1.5, "count": count})
-        metrics = {"last": {"metric": "final(sensor.yaw_rate)"}}
-        experiment = experiment_of(
-            folder / "e.yaml", named_runs(folder)[:1], title="t", axes={"g": axis}, metrics=metrics
-        )
+        experiment = over_gains(folder, runs=1, **{"from": 0.5, "to": 1.5, "count": count})
         with Executor(folder / f"{count}", "many", runner, of_jobs={"fmus": fmus}) as execute:
             tracemalloc.start()
             result = execute(experiment, keep=False)
@@ -152,9 +156,8 @@ def test_plans_that_cannot_be_stored_are_one_sentence(executor, tmp_path, monkey
     monkeypatch.setattr("yawbench.studies.on_demand.IN_MEMORY", 1)
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "missing"))
     execute, _ = executor()
-    with execute, pytest.raises(ResultsError) as error:
+    with execute, refused(ResultsError, names=(tmp_path / "missing", "TMPDIR")):
         execute.plans(named_runs(tmp_path))
-    assert mentions(error.value, tmp_path / "missing", "TMPDIR")
 
 
 def found_by(passing, **bounds):
@@ -189,18 +192,11 @@ def test_a_search_concludes_nothing_from_a_failure_of_the_machine(code, counts, 
         for job in jobs:
             done(Outcome(job, (Diagnostic(code, "why it failed"),), 1))
 
-    axis = DesignAxisSpec.model_validate({"vary": GAIN, "values": [0.5, 1.0]})
-    metrics = {"last": {"metric": "final(sensor.yaw_rate)"}}
-    experiment = experiment_of(
-        tmp_path / "e.yaml", named_runs(tmp_path), title="t", axes={"g": axis}, metrics=metrics
-    )
     with replace(execute, runner=runner) as failing:
-        found = failing(experiment, keep=False)
+        found = failing(over_gains(tmp_path), keep=False)
     assert [record.status for record in found.records] == ["failed"] * 4
     if counts:
         assert found.of_models() is found
         return
-    with pytest.raises(ResultsError) as caught:
+    with refused(ResultsError, "runs-missing", names=("why it failed", "4 runs")):
         found.of_models()
-    assert caught.value.code == "runs-missing"
-    assert "why it failed" in str(caught.value) and "4 runs" in str(caught.value)

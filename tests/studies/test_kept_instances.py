@@ -136,7 +136,7 @@ def outcomes(some: list[Job], folder: Path, **options) -> list[object]:
     return [shown(*pair) for pair in zip(placed, execute(placed, **options), strict=True)]
 
 
-@pytest.mark.parametrize("count", [20, pytest.param(500, marks=pytest.mark.exhaustive)])
+@pytest.mark.parametrize("count", [12, pytest.param(500, marks=pytest.mark.exhaustive)])
 def test_runs_in_random_order_give_the_bytes_of_fresh_processes(count, kinds, tmp_path, monkeypatch):
     chance = random.Random(count)
     order = [chance.randrange(len(kinds)) for _ in range(count)]

@@ -13,7 +13,7 @@ from tests.checkout import ROOT
 from tests.markdown import table_in
 from yawbench.studies.axes import RegionSpec
 from yawbench.studies.claims import ONE_IN
-from yawbench.studies.confidence import TAIL, Decision, SequentialTest, share_bounds
+from yawbench.studies.confidence import Decision, SequentialTest, share_bounds
 from yawbench.studies.sampling import hypercube
 
 PAGE = ROOT / "docs" / "regions.md"
@@ -80,29 +80,6 @@ def test_so_it_is_at_the_points_of_the_extended_hypercube():
     for share, wrong in WRONG.items():
         assert sum(found[share][one] for one in wrong) <= 0.05 * CLAIMS
         assert cells(found[share]) == published(share)[HYPERCUBE]
-
-
-def test_claims_far_from_the_limit_are_decided_early():
-    chance = np.random.default_rng(3)
-
-    def numbers(share: float) -> list[int]:
-        return [stop(one) for one in chance.random((200, TEST.looks[-1])) < share]
-
-    assert set(numbers(0.0)) == {48}  # 0.9**48 is below what may be spent there, 0.9**32 is not
-    assert np.mean(numbers(0.5)) < 25
-    assert np.mean(numbers(0.1)) > 110
-
-
-def test_the_errors_at_the_limit_are_exact_and_nowhere_exceed_what_may_be_spent():
-    low, high = TEST._tails(TEST.limit, TEST.boundaries[-1][0], TEST.looks[-1])
-    assert 0.5 * TAIL < low <= TAIL
-    assert high <= 1.0
-    _, high = TEST._tails(TEST.limit, TEST.boundaries[-1][1], TEST.looks[-1])
-    assert 0.5 * TAIL < high <= TAIL
-    chance = np.random.default_rng(4)
-    found = Counter(decided(one) for one in chance.random((20_000, TEST.looks[-1])) < TEST.limit)
-    assert found[Decision.BELOW] / 20_000 == pytest.approx(low, abs=0.004)  # 4 standard deviations
-    assert found[Decision.ABOVE] / 20_000 == pytest.approx(high, abs=0.005)
 
 
 def test_the_interval_agrees_with_the_decision_and_has_its_confidence():

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import json
-import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,6 +15,7 @@ from lxml import html
 from tests.orchestrator.recorded import car, write
 from tests.refusals import each_mentions, mentions, refused, texts_of
 from tests.reports.made_up import unpacked
+from tests.studies.experiment_files import written
 from yawbench.foundation.errors import Diagnostic, ScenarioError
 from yawbench.metrics.expressions import MetricValue
 from yawbench.orchestrator.plan import Override
@@ -79,23 +79,7 @@ figures:
 @pytest.fixture
 def study(tmp_path):
     """Load the study with texts of it replaced."""
-
-    def load(*changes: tuple[str, str]):
-        text = STUDY
-        for old, new in changes:
-            assert old in text
-            text = text.replace(old, new)
-        path = tmp_path / "study.yaml"
-        path.write_text(text)
-        return load_experiment(path)
-
-    return load
-
-
-def problems(study, *changes):
-    with pytest.raises(ScenarioError) as error:
-        study(*changes)
-    return [problem.partition(": ")[2] for problem in texts_of(error.value)]
+    return lambda *changes: load_experiment(written(tmp_path, STUDY, *changes))
 
 
 def page(findings, out) -> str:
@@ -112,7 +96,7 @@ GAINS = {"15mps/off": 2.4, "15mps/fnn": 1.02, "25mps/off": 3.0, "25mps/fnn": 1.0
 def out(tmp_path) -> Path:
     """A folder with results of all runs."""
     for name, gain in GAINS.items():
-        write(car(gain), tmp_path / "out" / name)
+        write(car(gain, n=161), tmp_path / "out" / name)
     return tmp_path / "out"
 
 
@@ -140,12 +124,6 @@ figures:
     assert mentions(drawn, "controller_made_up", "01234567", "plant_made_up")
 
 
-def judged(claim, values, runs):
-    """Return whether a claim holds, and what was measured in words."""
-    result = ClaimResult.of(claim, "claims", [comparisons(claim, values, runs)], None)
-    return result.verdict.holds, measured_words(result)
-
-
 @pytest.mark.parametrize(
     "value, bound, expected",
     [
@@ -158,25 +136,15 @@ def judged(claim, values, runs):
 def test_numbers_that_decide_a_verdict_read_differently(value, bound, expected):
     condition = {"run": "a", "metric": "far", "below": {"run": "b", "metric": "far"}}
     claim = Claim.model_validate({"says": "Less.", "holds_if": [condition]})
-    found = judged(
-        claim,
-        {("a", "far"): MetricValue(value, "m"), ("b", "far"): MetricValue(bound, "m")},
-        {"a": "held", "b": "free"},
-    )
-    assert found == (value < bound, [expected])
+    values = {(run, "far"): MetricValue(number, "m") for run, number in (("a", value), ("b", bound))}
+    compared = comparisons(claim, values, {"a": "held", "b": "free"})
+    result = ClaimResult.of(claim, "claims", [compared], None)
+    assert (result.verdict.holds, measured_words(result)) == (value < bound, [expected])
 
 
 def test_a_margin_beyond_the_threshold_itself_is_told_in_words():
-    assert [share(x) for x in (0.016, -0.5, 1.0, -1.0, 1.01, -62.29, math.inf, -math.inf)] == [
-        "1.6 %",
-        "-50 %",
-        "100 %",
-        "-100 %",
-        "by far",
-        "missed by far",
-        "by far",
-        "missed by far",
-    ]
+    told = {0.016: "1.6 %", -0.5: "-50 %", 1.0: "100 %", -1.0: "-100 %", 1.01: "by far", -62: "missed by far"}
+    assert {x: share(x) for x in told} == told
 
 
 def test_the_viewer_has_a_view_per_figure_the_one_in_which_most_happens_first(study, tmp_path):
@@ -190,7 +158,7 @@ figures:
     )
     gains = {"15mps/off": 1.1, "15mps/fnn": 1.0, "25mps/off": 3.0, "25mps/fnn": 1.0, "slow": 1.0}
     for name, gain in gains.items():
-        run = car(gain)
+        run = car(gain, n=161)
         lost = replace(run, columns={k: x for k, x in run.columns.items() if "position" not in k})
         write(lost if name == "slow" else run, tmp_path / "out" / name)
     shown, _ = viewer_of(judge_results(made, tmp_path / "out"))
@@ -208,7 +176,9 @@ figures:
 
 
 def test_for_stands_for_one_run_per_combination(study, tmp_path):
-    runs = study().runs
+    runs = study(
+        ("name: slow, scenario: slow.yaml", "name: slow, swap: {tyre: mine/t.fmu}, scenario: slow.yaml")
+    ).runs
     assert list(runs) == ["15mps/off", "15mps/fnn", "25mps/off", "25mps/fnn", "slow"]
     run = runs["25mps/fnn"]
     assert (run.label, run.row) == ("neural network", "25 m/s, neural network")
@@ -219,24 +189,20 @@ def test_for_stands_for_one_run_per_combination(study, tmp_path):
         Override.of("controller", "controller_fnn", "study"),
     )
     assert (runs["slow"].label, runs["slow"].row) == ("slow", "slow")
-
-
-def test_an_fmu_given_by_its_path_is_relative_to_the_study_file(study, tmp_path):
-    run = study(('"controller_{controller}"', '"mine/{controller}.fmu"')).runs["15mps/fnn"]
-    assert run.changes[-1] == Override.of("controller", str(tmp_path / "mine/fnn.fmu"), "study")
+    assert Override.of("tyre", str(tmp_path / "mine/t.fmu"), "study") in runs["slow"].changes
 
 
 def test_all_problems_of_a_study_are_reported_at_once(study):
-    found = problems(
-        study,
-        ("stop_time: 2 s", "stop_tim: 2 s"),
-        ("relative_peak_error(sideslip), h", "relative_peek_error(sideslip), h"),
-        ("window: [6.5, 8]", "window: [6.5]"),
-        ("title: Both at", "titel: Both at"),
-        ("above: 100 %", "above: [1]"),
-    )
+    with pytest.raises(ScenarioError) as error:
+        study(
+            ("stop_time: 2 s", "stop_tim: 2 s"),
+            ("relative_peak_error(sideslip), h", "relative_peek_error(sideslip), h"),
+            ("window: [6.5, 8]", "window: [6.5]"),
+            ("title: Both at", "titel: Both at"),
+            ("above: 100 %", "above: [1]"),
+        )
     assert each_mentions(
-        found,
+        texts_of(error.value),
         ("runs[1].stop_tim", "'stop_time'", "swap", "row"),
         (
             "metrics.error.metric",
@@ -250,45 +216,55 @@ def test_all_problems_of_a_study_are_reported_at_once(study):
     )
 
 
-def test_names_that_do_not_exist_are_reported_with_the_likely_ones(study):
-    found = problems(
-        study,
-        ("metrics: [error, moment]", "metrics: [error, momentum]"),
-        ("{run: 15mps/off, metric: error, above", "{run: 15mps/of, metric: error, above"),
-        ("{run: 25mps/off, metric: error}", "{run: 25mps/off, metric: errors}"),
-        ("runs: [slow], panels", "runs: [slowly], panels"),
-    )
-    assert each_mentions(
-        found,
-        ("tables[0].metrics[1]", "'momentum'", "'moment'"),
-        ("claims[0].holds_if[0].run", "'15mps/of'", "'15mps/off'"),
-        ("claims[2].holds_if[1].below.metric", "'errors'", "'error'"),
-        ("figures[1].runs[0]", "'slowly'", "'slow'"),
-    )
-
-
-def test_no_two_runs_have_one_name(study):
-    assert each_mentions(problems(study, ("name: slow", "name: 15mps/off")), ("runs[1].name", "'15mps/off'"))
-
-
-@pytest.mark.parametrize("name", ["../up", "figures/x", "a//b", "/root", "a b", ".."])
-def test_a_run_is_named_as_a_folder_below_may_be(study, name):
-    assert each_mentions(
-        problems(study, ("name: slow", f'name: "{name}"')), ("runs[1].name", "letters", "digits", f"'{name}'")
-    )
-
-
-def test_a_placeholder_without_values_is_an_error(study):
-    assert each_mentions(
-        problems(study, ('"{speed}mps.yaml"', '"{sped}mps.yaml"')), ("runs[0].scenario", "'speed'")
-    )
-
-
-def test_a_condition_has_exactly_one_bound(study):
-    assert each_mentions(
-        problems(study, ("above: 100 %", "above: 100 %, below: 200 %")),
-        ("claims[0].holds_if[0]", "at_least", "at_most"),
-    )
+@pytest.mark.parametrize(
+    ("old", "new", "names"),
+    [
+        (
+            "metrics: [error, moment]",
+            "metrics: [error, momentum]",
+            ("tables[0].metrics[1]", "'momentum'", "'moment'"),
+        ),
+        (
+            "{run: 15mps/off, metric: error, above",
+            "{run: 15mps/of, metric: error, above",
+            ("claims[0].holds_if[0].run", "'15mps/of'", "'15mps/off'"),
+        ),
+        (
+            "{run: 25mps/off, metric: error}",
+            "{run: 25mps/off, metric: errors}",
+            ("claims[2].holds_if[1].below.metric", "'errors'", "'error'"),
+        ),
+        ("runs: [slow], panels", "runs: [slowly], panels", ("figures[1].runs[0]", "'slowly'", "'slow'")),
+        ("name: slow", "name: 15mps/off", ("runs[1].name", "'15mps/off'")),
+        *(
+            ("name: slow", f'name: "{name}"', ("runs[1].name", "letters", "digits", f"'{name}'"))
+            for name in ("../up", "figures/x", "a//b", "a b")
+        ),
+        ('"{speed}mps.yaml"', '"{sped}mps.yaml"', ("runs[0].scenario", "'speed'")),
+        ("above: 100 %", "above: 100 %, below: 200 %", ("claims[0].holds_if[0]", "at_least", "at_most")),
+        ("metric: error\n    run", "metric: eror\n    run", ("grids.errors.metric", "'eror'")),
+        ("speed: [15, 25]}\n    col", "speed: [15, 26]}\n    col", ("grids.errors", "'26mps/off'")),
+        ("[2, 0.05]]", "[2]]", ("grids.errors", "published", "2 rows", "2 numbers")),
+        ('"{speed}mps/{controller}"\n    rows', '"{speed}mps/off"\n    rows', ("depend", "{controller}")),
+        ("    rows: {speed: [15, 25]}", "    rows: {a: [1], b: [2]}", ("one name", "values")),
+        ("rank_correlation: errors", "rank_correlation: error", ("grid 'error'", "'errors'")),
+        ("(off - fnn) / off", "(of - fnn) / off", ("expression", "of", "off and fnn")),
+        ("(off - fnn) / off", "off ** fnn", ("+ - * /",)),
+        ("(off - fnn) / off", "(off - ", ("expression",)),
+        ("(off - fnn) / off", "abs(off)", ("numbers", "names", "parentheses")),
+        ("    expression: (off - fnn) / off\n", "", ("expression", "rank_correlation", "exactly one")),
+        ("of: {off: {run: 15mps/off", "of: {off: {run: 15mps/of", ("derived.drop.of.off.run", "15mps/of")),
+        ('    unit: "%"', '    unit: "%"\n    published: 95 kg', ("published", "'95 kg'")),
+        ('    unit: "%"', '    unit: "%"\n    published: much', ("published", "number")),
+        ("{derived: order, at", "{derived: ordre, at", ("'ordre'", "'order'")),
+        ("{derived: order, at", "{derived: order, run: slow, at", ("run and metric", "derived")),
+        ("{derived: order, at", "{at", ("run and metric", "derived")),
+    ],
+)
+def test_what_is_wrong_is_said_with_its_place_and_the_likely_names(with_grid, old, new, names):
+    with pytest.raises(ScenarioError) as error:
+        with_grid((old, new))
+    assert mentions(error.value, *names)
 
 
 def test_a_missing_study_file_is_one_sentence(tmp_path):
@@ -311,15 +287,15 @@ def test_claims_are_judged_by_the_results_on_disk(study, out):
         ("4.00 %", "25 m/s", "200 %", "network", "against"),
     )
     assert measured_words(findings.checks[1]) == ["2000 N·m (15 m/s, neural network)"]
-    write(car(1.001), out / "15mps/fnn")
-    assert verdicts(judge_results(study(), out).claims) == [True, True, True]
+
+
+def failing(out, name):
+    """Return how a run ended that has just failed."""
+    return Outcome(Job(name, Path("x"), out / name), (Diagnostic("run-failed", "plant: lost"),), 1)
 
 
 def test_a_claim_about_a_run_without_results_is_not_judged(study, out):
-    lost = Outcome(
-        Job("15mps/off", Path("x"), out / "15mps/off"), (Diagnostic("run-failed", "plant: lost"),), 1
-    )
-    findings = judge_results(study(), out, [lost])
+    findings = judge_results(study(), out, [failing(out, "15mps/off")])
     assert findings.failed == {"15mps/off": "plant: lost"}
     assert verdicts(findings.claims) == [None, False, None]
     assert mentions(measured_words(findings.claims[2])[0], "2.00 %", "15 m/s", "network", "against")
@@ -327,7 +303,7 @@ def test_a_claim_about_a_run_without_results_is_not_judged(study, out):
 
 
 def test_a_run_that_ended_early_counts_as_failed(study, out):
-    write(car(1.0), out / "slow", status="interrupted", error={"message": "the run was interrupted"})
+    write(car(1.0, n=161), out / "slow", status="interrupted", error={"message": "the run was interrupted"})
     findings = judge_results(study(), out)
     assert findings.failed.keys() == {"slow"}
     assert mentions(findings.failed["slow"], out / "slow", "early", "interrupted")
@@ -355,15 +331,7 @@ def test_operators_and_factors_compare_as_they_say():
 @pytest.fixture
 def with_grid(study):
     """The study with a grid of its four runs, derived numbers and claims about them."""
-
-    def load(*changes):
-        return study(
-            ("claims:\n", GRID + "claims:\n"),
-            ("checks:\n", CHECKS),
-            *changes,
-        )
-
-    return load
+    return lambda *changes: study(("claims:\n", GRID + "claims:\n"), ("checks:\n", CHECKS), *changes)
 
 
 GRID = """\
@@ -413,18 +381,6 @@ def test_a_grid_stands_beside_the_published_numbers_with_its_rank_correlation(wi
 
 
 def test_a_grid_and_its_derived_numbers_are_written_down(with_grid, out):
-    findings = judge_results(with_grid(), out)
-    said = page(findings, out)
-    assert "15 1.40 0.0200" in said
-    assert "15 3.00 0.0100" in said
-    write_findings(findings, {}, out)
-    record = json.loads((out / "experiment.json").read_text())
-    assert record["derived"]["drop"]["value"] == pytest.approx(1.38 / 1.4)
-    assert record["derived"]["drop"]["of"]["off"] == ["15mps/off", "error"]
-    assert record["checks"][0]["holds_if"] == ["order ≥ 0.9"]
-
-
-def test_a_derived_number_stands_beside_the_published_one(with_grid, out):
     findings = judge_results(with_grid(('    unit: "%"\n', '    unit: "%"\n    published: 95 %\n')), out)
     _, numbers = derived_tables(findings)
     assert numbers.headings == ["what", "value", "the paper says"]
@@ -432,58 +388,16 @@ def test_a_derived_number_stands_beside_the_published_one(with_grid, out):
         ["Rank correlation", "0.900", "-"],
         ["Share of the error removed", "98.6 %", "95.0 %"],
     ]
+    said = page(findings, out)
+    assert "15 1.40 0.0200" in said
+    assert "15 3.00 0.0100" in said
     write_findings(findings, {}, out)
     record = json.loads((out / "experiment.json").read_text())
-    assert record["derived"]["drop"]["published"] == pytest.approx(0.95)
-    assert record["derived"]["order"]["published"] is None
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "said"),
-    [
-        ("metric: error\n    run", "metric: eror\n    run", "grids.errors.metric: there is no metric 'eror'"),
-        (
-            "speed: [15, 25]}\n    col",
-            "speed: [15, 26]}\n    col",
-            "grids.errors: there is no run '26mps/off'",
-        ),
-        ("[2, 0.05]]", "[2]]", "grids.errors: published: must have 2 rows of 2 numbers"),
-        (
-            '"{speed}mps/{controller}"\n    rows',
-            '"{speed}mps/off"\n    rows',
-            "does not depend on {controller}",
-        ),
-        (
-            "    rows: {speed: [15, 25]}",
-            "    rows: {a: [1], b: [2]}",
-            "needs exactly one name with its values",
-        ),
-        ("rank_correlation: errors", "rank_correlation: error", "there is no grid 'error'; did you mean"),
-        ("(off - fnn) / off", "(of - fnn) / off", "expression: of is undefined; 'of' has off and fnn"),
-        ("(off - fnn) / off", "off ** fnn", "only + - * / are allowed"),
-        ("(off - fnn) / off", "(off - ", "is not an expression"),
-        ("(off - fnn) / off", "abs(off)", "only numbers, names, + - * / and parentheses are allowed"),
-        ("    expression: (off - fnn) / off\n", "", "needs exactly one of expression and rank_correlation"),
-        ("of: {off: {run: 15mps/off", "of: {off: {run: 15mps/of", "derived.drop.of.off.run: there is no run"),
-        ('    unit: "%"', '    unit: "%"\n    published: 95 kg', "published: '95 kg' is not a value in 1"),
-        (
-            '    unit: "%"',
-            '    unit: "%"\n    published: much',
-            "published: must be a number, or a number with",
-        ),
-        ("{derived: order, at", "{derived: ordre, at", "there is no derived number 'ordre'; did you mean"),
-        (
-            "{derived: order, at",
-            "{derived: order, run: slow, at",
-            "needs run and metric, or derived in place",
-        ),
-        ("{derived: order, at", "{at", "needs run and metric, or derived in place of both"),
-    ],
-)
-def test_what_is_wrong_with_grids_and_derived_numbers_is_said(with_grid, old, new, said):
-    with pytest.raises(ScenarioError) as error:
-        with_grid((old, new))
-    assert any(said in problem for problem in texts_of(error.value)), texts_of(error.value)
+    drop, order = (record["derived"][name] for name in ("drop", "order"))
+    assert (drop["value"], drop["published"]) == (pytest.approx(1.38 / 1.4), pytest.approx(0.95))
+    assert drop["of"]["off"] == ["15mps/off", "error"]
+    assert order["published"] is None
+    assert record["checks"][0]["holds_if"] == ["order ≥ 0.9"]
 
 
 def test_expressions_are_arithmetic():
@@ -525,8 +439,7 @@ def test_claims_about_several_runs_and_checks_have_tables_of_their_own(study, ou
 
 
 def test_a_failed_run_is_named_in_the_table_with_its_reason(study, out):
-    lost = Outcome(Job("slow", Path("x"), out / "slow"), (Diagnostic("run-failed", "plant: lost"),), 1)
-    (table,) = run_tables(judge_results(study(), out, [lost]))
+    (table,) = run_tables(judge_results(study(), out, [failing(out, "slow")]))
     assert table.text()[-1] == ["slow", "failed", "-", "-", "-", "-"]
     assert mentions(table.notes[-1], "slow", "plant", "lost")
 

@@ -97,9 +97,10 @@ def legend(drawn):
 
 
 def test_a_limit_is_the_largest_value_that_holds_with_all_below_it(swept):
+    made = swept()
     found = {
         (limit.others["friction"].value, limit.others["control"].value): (limit.largest, limit.beyond)
-        for limit in limits_of(swept(), swept().spec.limits["stable"])
+        for limit in limits_of(made, made.spec.limits["stable"])
     }
     assert found == {
         (0.2, "a"): (36.0, 72.0),
@@ -109,6 +110,13 @@ def test_a_limit_is_the_largest_value_that_holds_with_all_below_it(swept):
         (1.0, "a"): (108.0, 144.0),
         (1.0, "b"): (144.0, None),
     }
+    again = swept(lambda friction, speed, control: 50.0 if speed == 72.0 else 1.0)
+    assert {limit.largest for limit in limits_of(again, again.spec.limits["stable"])} == {36.0}
+    table = limit_table(made, "stable")
+    assert table.rows[0] == ["0.2", "without", "36.0", "72.0"]
+    assert table.rows[1] == ["0.2", "with", "36.0", "72.0 (the run failed)"]
+    assert table.rows[3] == ["0.5", "with", "144", "-"]
+    assert mentions(table.title, "km/h", "Stable")
 
 
 def test_the_table_says_of_every_run_how_it_ended_and_why(swept):
@@ -124,19 +132,6 @@ def test_the_table_says_of_every_run_how_it_ended_and_why(swept):
         "failed": "plant: it failed",
     }
     assert made.records[0].values == {"sideslip": None}
-
-
-def test_a_value_that_holds_again_further_up_does_not_count(swept):
-    again = swept(lambda friction, speed, control: 50.0 if speed == 72.0 else 1.0)
-    assert {limit.largest for limit in limits_of(again, again.spec.limits["stable"])} == {36.0}
-
-
-def test_the_table_of_a_limit_says_where_a_run_failed_and_where_nothing_ends(swept):
-    rows = limit_table(swept(), "stable").rows
-    assert rows[0] == ["0.2", "without", "36.0", "72.0"]
-    assert rows[1] == ["0.2", "with", "36.0", "72.0 (the run failed)"]
-    assert rows[3] == ["0.5", "with", "144", "-"]
-    assert mentions(limit_table(swept(), "stable").title, "km/h", "Stable")
 
 
 def test_a_limit_is_drawn_as_a_line_and_a_band_to_the_first_value_that_fails(swept):
@@ -155,42 +150,34 @@ def test_a_map_has_a_cell_per_run_a_cross_where_it_failed_and_the_edge_of_the_ma
     cells = without.collections[0].get_array()
     assert cells.shape == (4, 3)
     assert cells[0].tolist() == pytest.approx([5.0, 2.0, 1.0])
-    assert [axes.get_title(loc="left") for axes in (without, with_)] == ["without", "with"]
+    assert headings(drawn)[:2] == ["without", "with"]
     crosses = [line for line in with_.get_lines() if line.get_marker() == "x"]
     assert crosses[0].get_xydata().tolist() == [[0.2, 72.0]]
     assert mentions(bar.get_ylabel(), "Largest", "sideslip")
     assert each_mentions(legend(drawn), ("10.0 °", "line"), ("never", "number"))
 
 
+def headings(drawn):
+    return [axes.get_title(loc="left") for axes in drawn.axes]
+
+
 def test_curves_have_a_panel_per_level_and_only_those_that_are_asked_for(swept):
     drawn = figure(swept(), "curve")
-    assert [axes.get_title(loc="left") for axes in drawn.axes] == [
-        "friction 0.2",
-        "friction 0.5",
-        "friction 1.0",
-    ]
+    assert headings(drawn) == ["friction 0.2", "friction 0.5", "friction 1.0"]
     assert drawn.axes[0].get_lines()[0].get_ydata().tolist() == pytest.approx([5.0, 20.0, 45.0, 80.0])
     assert mentions(drawn.axes[0].get_xlabel(), "km/h", "Entry")
-    (only,) = figure(swept(), "some").axes
-    assert only.get_title(loc="left") == "friction 0.5"
-
-
-def test_an_axis_of_names_is_drawn_in_its_order(swept):
-    axes = figure(swept(), "names").axes[-1]
-    assert [tick.get_text() for tick in axes.get_xticklabels()] == ["without", "with"]
-    assert axes.get_yscale() == "log"
-
-
-def test_only_the_values_that_are_asked_for_are_drawn_along_x_and_as_lines(swept):
-    axes = figure(swept(), "narrow").axes[-1]
-    assert [tick.get_text() for tick in axes.get_xticklabels()] == ["with"]
-    assert [line.get_xydata().tolist() for line in axes.get_lines()] == [[[0.0, 0.25]], [[0.0, 4.0]]]
-
-
-def test_what_never_ends_is_a_cross_too(swept):
+    assert headings(figure(swept(), "some")) == ["friction 0.5"]
     never = swept(lambda friction, speed, control: math.inf if speed == 36.0 else 1.0)
     crosses = [line for line in figure(never, "curve").axes[0].get_lines() if line.get_marker() == "x"]
-    assert crosses[0].get_xdata() == [36.0]
+    assert crosses[0].get_xdata() == [36.0]  # what never ends
+
+
+def test_an_axis_of_names_is_drawn_in_its_order_with_only_the_values_that_are_asked_for(swept):
+    names, narrow = (figure(swept(), name).axes[-1] for name in ("names", "narrow"))
+    assert [tick.get_text() for tick in names.get_xticklabels()] == ["without", "with"]
+    assert names.get_yscale() == "log"
+    assert [tick.get_text() for tick in narrow.get_xticklabels()] == ["with"]
+    assert [line.get_xydata().tolist() for line in narrow.get_lines()] == [[[0.0, 0.25]], [[0.0, 4.0]]]
 
 
 def test_a_metric_that_no_run_gives_cannot_be_drawn(swept):

@@ -13,7 +13,7 @@ from rich.console import Console
 import yawbench as yb
 from yawbench.figures.latex import escaped
 from yawbench.metrics.expressions import MetricValue
-from yawbench.studies.tables import Column, Table, column, for_terminal, to_csv, to_latex, to_pandas
+from yawbench.studies.tables import Table, column, for_terminal, to_csv, to_latex, to_pandas
 from yawbench.studies.uncertainty import SAMPLE_TABLES
 
 
@@ -42,16 +42,14 @@ def test_numbers_of_one_unit_are_written_in_si_and_others_as_text(runs):
 
 
 def test_plain_numbers_of_a_column_are_shown_with_its_unit():
-    table = Table.of_columns(
-        [
-            column("run", "int64", [1, 2]),
-            column("slip", "float64", [0.5, None], {"unit": "rad", "description": "peak"}),
-        ]
-    )
+    about = {"unit": "rad", "description": "peak"}
+    columns = [column("run", "int64", [1, 2]), column("slip", "float64", [0.5, None], about)]
+    table, empty = Table.of_columns(columns), Table("", [of for of, _ in columns])
     assert table.text() == [["1", "28.6 °"], ["2", "-"]]
     assert [table.is_number(k) for k in range(2)] == [True, True]
-    assert to_pandas(table).dtypes.to_list() == [np.int64, np.float64]
-    assert to_csv(table) == "run,slip [rad]\n1,0.5\n2,\n"
+    for one in (table, empty):
+        assert to_pandas(one).dtypes.to_list() == [np.int64, np.float64]
+    assert (to_csv(table), to_csv(empty)) == ("run,slip [rad]\n1,0.5\n2,\n", "run,slip [rad]\n")
 
 
 def test_a_table_is_the_same_on_the_terminal_and_in_latex(runs):
@@ -64,12 +62,6 @@ def test_a_table_is_the_same_on_the_terminal_and_in_latex(runs):
     assert r"\begin{tabular}{lrrr}" in latex
     assert r"50 \% \& more & 28.6 \ensuremath{^\circ} & 25.0 \% & 3 \\" in latex
     assert r"\begin{tabular}[t]{@{}l@{}}a\textbar{}b\_c \\ d\end{tabular} & - & 2.00 m & 12 \\" in latex
-
-
-def test_a_table_without_rows_keeps_the_kinds_of_its_columns():
-    table = Table("", [Column("run", "int64"), Column("slip", "float64", {"unit": "rad"})])
-    assert to_pandas(table).dtypes.to_list() == [np.int64, np.float64]
-    assert to_csv(table) == "run,slip [rad]\n"
 
 
 ODD = (

@@ -10,7 +10,7 @@ from lxml import html
 from ruamel.yaml import YAML
 
 from tests.refusals import mentions
-from yawbench.cli import main
+from tests.studies.experiment_files import written
 from yawbench.orchestrator.scenario import yaml_lines
 from yawbench.orchestrator.scenario.schema_validation import validate
 from yawbench.ranking.ranking import EntriesSpec
@@ -50,26 +50,18 @@ UNITS = ("driver_sine",)
 
 
 @pytest.fixture
-def yawbench(fmus, tmp_path, capfd):
-    (tmp_path / "wheel.yaml").write_text(SCENARIO)
-    file = tmp_path / "tuning.yaml"
-    file.write_text(TUNING)
+def tune(fmus, tmp_path, yawbench):
+    """Tune, or call another command with, the file with texts replaced."""
 
-    def run(*arguments, command="tune", **other):
-        text = TUNING
-        for old, new in other.items():
-            text = text.replace(old, new)
-        file.write_text(text)
-        with pytest.raises(SystemExit) as end:
-            main([command, str(file), "--out", str(tmp_path / "out"), "--fmus", str(fmus), *arguments])
-        told = capfd.readouterr()
-        return end.value.code or 0, told.out, told.err
+    def run(*changes, command="tune"):
+        file = written(tmp_path, TUNING, *changes, wheel=SCENARIO)
+        return yawbench(command, file, "--out", tmp_path / "out", "--fmus", fmus)
 
     return run
 
 
-def test_the_least_of_all_trials_is_found_written_down_and_not_sought_twice(yawbench, tmp_path):
-    status, out, told = yawbench()
+def test_the_least_of_all_trials_is_found_written_down_and_not_sought_twice(tune, tmp_path):
+    status, out, told = tune()
     assert status == 0, told
     trials = list(csv.DictReader((tmp_path / "out/trials.csv").open()))
     assert [row["generation"] for row in trials] == [str(1 + k // 5) for k in range(10)]
@@ -89,43 +81,42 @@ def test_the_least_of_all_trials_is_found_written_down_and_not_sought_twice(yawb
     wanted = {"title": "tuned big wheel", "fmu": "driver_sine", "gains": "tuned", "parameters": made}
     source = entry[1].pop("source")
     assert entry == ("big_wheel_tuned", wanted)
-    assert mentions(source, "tuning.yaml", "10 trials", "seed 2", "1.36e-07", "0.0003239")
+    assert mentions(source, "experiment.yaml", "10 trials", "seed 2", "1.36e-07", "0.0003239")
     found = json.loads((tmp_path / "out/experiment.json").read_text())
     assert [*found["runs"]] == ["turned"]
     page = html.fromstring((tmp_path / "out/report.html").read_text())
     assert mentions(page.text_content(), "5", "2 trials", "seed 2")
     before = (tmp_path / "out/trials.csv").read_bytes()
     runs = (tmp_path / "out/runs.jsonl").read_bytes()
-    status, out, told = yawbench()
+    status, out, told = tune()
     assert (status, (tmp_path / "out/runs.jsonl").read_bytes()) == (0, runs)
     assert (tmp_path / "out/trials.csv").read_bytes() == before
 
 
 @pytest.mark.parametrize(
-    ("wrong", "names"),
+    ("old", "new", "names"),
     [
-        ({"objective: miss": "objective: mist"}, ("'mist'", "'miss'")),
-        ({"runs: [turned]": "runs: [burned]"}, ("'burned'", "'turned'")),
-        ({"from: 0.5, to: 5": "values: [1, 2]"}, ("axes.angle", "count")),
-        ({"entries: driver": "entries: wheel"}, ("'big wheel'", "changes", "driver")),
-        ({"swap: {driver: driver_sine}": "stop_time: 1"}, ("'big wheel'", "stop_time")),
-        ({"      swap: {driver: driver_sine}\n": ""}, ("'big wheel'",)),
-        ({"population: 5": "population: 3"}, ("tuning.population",)),
-        ({"tuning:": "axes: {a: {vary: driver.amplitude, values: [1]}}\ntuning:"}, ("axes",)),
+        ("objective: miss", "objective: mist", ("'mist'", "'miss'")),
+        ("runs: [turned]", "runs: [burned]", ("'burned'", "'turned'")),
+        ("from: 0.5, to: 5", "values: [1, 2]", ("axes.angle", "count")),
+        ("entries: driver", "entries: wheel", ("'big wheel'", "changes", "driver")),
+        ("swap: {driver: driver_sine}", "stop_time: 1", ("'big wheel'", "stop_time")),
+        ("      swap: {driver: driver_sine}\n", "", ("'big wheel'",)),
+        ("population: 5", "population: 3", ("tuning.population",)),
+        ("tuning:", "axes: {a: {vary: driver.amplitude, values: [1]}}\ntuning:", ("axes",)),
     ],
 )
-def test_what_is_wrong_with_a_tuning_file_is_said_before_anything_runs(yawbench, wrong, names):
-    status, out, told = yawbench(**wrong)
+def test_what_is_wrong_with_a_tuning_file_is_said_before_anything_runs(tune, old, new, names):
+    status, out, told = tune((old, new))
     assert (status, out) == (2, "")
     assert mentions(told, *names)
 
 
-def test_other_commands_say_what_a_tuning_file_is_for_and_tune_what_it_is_not(yawbench):
+def test_other_commands_say_what_a_tuning_file_is_for_and_tune_what_it_is_not(tune):
     for command in ("study", "run"):
-        status, _, told = yawbench(command=command)
+        status, _, told = tune(command=command)
         assert status == 2
-        assert "a tuning file" in told
-        assert "`yawbench tune`" in told
-    status, _, told = yawbench(**{TUNING.partition("tuning:")[2]: "", "tuning:": ""})
+        assert mentions(told, "tuning", "`yawbench tune`")
+    status, _, told = tune((TUNING.partition("tuning:")[2], ""), ("tuning:", ""))
     assert (status, told.count("\n")) == (2, 1)
     assert mentions(told, "'tuning'")

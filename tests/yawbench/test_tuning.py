@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import csv
+import functools
 import warnings
 from dataclasses import dataclass
-from pathlib import Path
 
-import numpy as np
 import pytest
 
 import yawbench as yb
@@ -37,10 +36,6 @@ def base():
 
 def follow(yaw_rate_ref, yaw_rate, gain=2e4):
     return gain * (yaw_rate_ref - yaw_rate)
-
-
-def in_numpy(yaw_rate_ref, yaw_rate, gain=2e4):
-    return float(np.array([gain]) @ np.array([yaw_rate_ref - yaw_rate]))
 
 
 class Law:
@@ -74,30 +69,26 @@ def test_the_trials_are_those_of_the_command(tmp_path):
     assert tuned.table["generation"].tolist() == [1] * 5 + [2] * 5
 
 
-@pytest.mark.parametrize(
-    "law", [follow, in_numpy, Law(2e4), Data()], ids=["function", "numpy", "object", "data"]
-)
+@pytest.mark.parametrize("law", [follow, Law(2e4), Data()], ids=["function", "object", "data"])
 def test_parameters_of_plain_python_are_tuned(base, law):
     scenario = base.swap(controller=law)
-    tuned = yb.tune(scenario, {"controller.gain": (1e3, 1e5, "log")}, ERROR, **SMALL)
+    tuned = yb.tune(scenario, {"controller.gain": (1e3, 1e5, "log")}, ERROR, **{**SMALL, "generations": 1})
     gain = tuned.values["controller.gain"]
-    assert tuned.table["controller.gain"].nunique() == 10
+    assert tuned.table["controller.gain"].nunique() == 5
     assert tuned.table["controller.gain"].between(1e3, 1e5).all()
     assert tuned.objective == tuned.table["objective"].min()
-    assert scenario.set(tuned.values).run().metric(ERROR) == tuned.objective
-    made = (
-        type(law)(gain)
-        if not callable(law)
-        else lambda yaw_rate_ref, yaw_rate: law(yaw_rate_ref, yaw_rate, gain)
-    )
-    assert base.swap(controller=made).run().metric(ERROR) == tuned.objective
+    made = functools.partial(law, gain=gain) if callable(law) else type(law)(gain)
+    for again in (scenario.set(tuned.values), base.swap(controller=made)):
+        assert again.run().metric(ERROR) == tuned.objective
 
 
-def test_the_objective_is_a_weighted_sum_averaged_over_scenarios(base):
+def test_the_objective_is_a_weighted_sum_averaged_over_scenarios(base, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     scenarios = [base.swap(controller=Law(1e4)), base.swap(controller=Law(1e4)).set({"speed": "70 km/h"})]
     weights = {ERROR: 2.0, EFFORT: -1e-6}
     ranges = {"controller.gain": (1e3, 1e5), "driver.amplitude": ("1 deg", "2 deg")}
     tuned = yb.tune(scenarios, ranges, weights, **SMALL)
+    assert list(tmp_path.iterdir()) == []  # nothing is written
     assert str(tuned.values["driver.amplitude"]).endswith(" deg")
     runs = [each.set(tuned.values).run() for each in scenarios]
     costs = [sum(weight * run.metric(name) for name, weight in weights.items()) for run in runs]
@@ -157,17 +148,13 @@ def test_wrong_ranges_are_refused_before_a_run(base, ranges, names, monkeypatch)
         yb.tune(base.swap(controller=follow), ranges, ERROR)
 
 
-def test_what_is_no_metric_is_refused_by_name(base):
-    ranges = {"driver.amplitude": (0.01, 0.02)}
-    for objective, *names in (
-        ("rms_eror(yaw_rate)", "'rms_eror'", "'rms_error'"),
-        ("peak(nothing)", "metrics.peak(nothing)", "fnn_sideslip/25mps.yaml"),
-    ):
-        with refused(yb.ScenarioError, names=(objective, *names)):
-            yb.tune(base, ranges, objective)
-
-
-def test_nothing_is_written(base, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    yb.tune(base, {"driver.amplitude": (0.01, 0.02)}, ERROR, population=5, generations=1)
-    assert list(Path().iterdir()) == []
+@pytest.mark.parametrize(
+    ("objective", "names"),
+    [
+        ("rms_eror(yaw_rate)", ("'rms_eror'", "'rms_error'")),
+        ("peak(nothing)", ("metrics.peak(nothing)", "fnn_sideslip/25mps.yaml")),
+    ],
+)
+def test_what_is_no_metric_is_refused_by_name(base, objective, names):
+    with refused(yb.ScenarioError, names=(objective, *names)):
+        yb.tune(base, {"driver.amplitude": (0.01, 0.02)}, objective)

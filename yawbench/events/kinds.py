@@ -41,12 +41,12 @@ def _size(x: SignalArrays) -> np.ndarray:
     return np.abs(x[0])
 
 
-def _of(*signals: str, value: Callable[[SignalArrays], np.ndarray], limit: float | None = None) -> Find:
+def _of(*signals: str, value: Callable[[SignalArrays], np.ndarray]) -> Find:
     """Return the search for signals of the car, or of each wheel where they have a `*`."""
 
     def find(results: Results) -> Iterator[Sought]:
         for columns in zip(*(columns_of(results, signal) for signal in signals), strict=False):
-            yield Sought(columns, value, limit, _wheel(columns[0]))
+            yield Sought(columns, value, None, _wheel(columns[0]))
 
     return find
 

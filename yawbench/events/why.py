@@ -331,8 +331,8 @@ def _number(value: float | None) -> str:
     return "" if value is None else f"{value:.3g}"
 
 
-def _quantity(event: EventRecord, value: float | None = None) -> str:
-    return _value(event.value if value is None else value, event.unit)
+def _quantity(event: EventRecord) -> str:
+    return _value(event.value, event.unit)
 
 
 def _value(value: float | None, unit: str) -> str:

@@ -241,23 +241,13 @@ def columns_of(results: Results, signal: str) -> list[str]:
 
 
 def _column(results: Results, name: str) -> str | None:
-    for role in (None, "plant"):
-        matches = results.candidates(name, role=role)
-        if len(matches) == 1:
-            meant = matches[0] == name or not _is_measured_or_estimated(results, matches[0])
-            return (
-                matches[0] if meant and np.issubdtype(results.columns[matches[0]].dtype, np.number) else None
-            )
-    matches = [
-        column
-        for column, signal in results.names.items()
-        if signal.variable == name and not _is_measured_or_estimated(results, column)
-    ]
-    return (
-        matches[0]
-        if len(matches) == 1 and np.issubdtype(results.columns[matches[0]].dtype, np.number)
-        else None
-    )
+    candidates = (results.candidates(name, role=role) for role in (None, "plant"))
+    matches = next((found for found in candidates if len(found) == 1), None)
+    if matches is None:
+        matches = [column for column, signal in results.names.items() if signal.variable == name]
+    meant = [one for one in matches if one == name or not _is_measured_or_estimated(results, one)]
+    is_number = len(meant) == 1 and np.issubdtype(results.columns[meant[0]].dtype, np.number)
+    return meant[0] if is_number else None
 
 
 @np.errstate(all="ignore")  # of runs that grow without bound; the number says so

@@ -97,10 +97,8 @@ def _quantile(degrees: float) -> float:
     return float(stdtrit(degrees, 0.5 + CONFIDENCE / 2))
 
 
-def share_bounds(count: int, number: int, confidence: float = CONFIDENCE) -> Bounds:
+def share_bounds(count: int, number: int) -> Bounds:
     """Return the Clopper-Pearson interval of a share, count of number.
-
-    Each bound by itself is one-sided at (1 + confidence) / 2: for 95 % one-sided, take a confidence of 90 %.
 
     Raises:
         ValueError: the count is not between 0 and the number, or the number is 0.
@@ -112,9 +110,8 @@ def share_bounds(count: int, number: int, confidence: float = CONFIDENCE) -> Bou
 
     if not 0 <= count <= number or not number:
         raise ValueError(f"a share needs a count between 0 and its number (got {count} of {number})")
-    tail = 0.5 * (1.0 - confidence)
-    low = float(betaincinv(count, number - count + 1, tail)) if count else 0.0
-    high = float(betaincinv(count + 1, number - count, 1.0 - tail)) if count < number else 1.0
+    low = float(betaincinv(count, number - count + 1, TAIL)) if count else 0.0
+    high = float(betaincinv(count + 1, number - count, 1.0 - TAIL)) if count < number else 1.0
     return Bounds(low, high)
 
 

@@ -39,7 +39,7 @@ from .axes import (
 from .claim_schema import MetricReference, MetricSpec, si_number
 from .jobs import Job, MetricRequests, TestRequest, key_of, plans_of
 from .on_demand import OnDemand
-from .references import problems_of, refuse
+from .problems import problems_of, refuse
 from .sampling import positions
 from .schema import ExperimentSpec, RunSpec
 from .sections import sections

@@ -32,21 +32,23 @@ Each = Callable[..., Iterable[Any]]
 """`map`, or a parallel equivalent such as `Pool.map`."""
 
 
+def within(number: float, unit: str, low: float, high: float) -> MetricValue:
+    """Return a number between two others: the bounds of its interval, or the ends of its range."""
+    return MetricValue(number, unit, max(high - number, number - low), (low, high))
+
+
 def _median(values: Sequence[MetricValue]) -> MetricValue:
     """Return the median of repeats with their range."""
     numbers = [value.number for value in values]
     median, low, high = statistics.median(numbers), min(numbers), max(numbers)
-    between = (low, high) if low < high else None
-    return MetricValue(median, values[0].shown_in, max(high - median, median - low), between)
+    unit = values[0].shown_in
+    return within(median, unit, low, high) if low < high else MetricValue(median, unit)
 
 
 def _share(values: Sequence[MetricValue]) -> MetricValue:
     """Return the share of repeats whose value is not 0, with the interval of Clopper and Pearson."""
     count, number = sum(value.number != 0.0 for value in values), len(values)
-    share, bounds = count / number, share_bounds(count, number)
-    return MetricValue(
-        share, PERCENT, max(bounds.high - share, share - bounds.low), (bounds.low, bounds.high)
-    )
+    return within(count / number, PERCENT, *share_bounds(count, number))
 
 
 def _over_repeats(values: Sequence[MetricValue], number: int, kind: str = "mean") -> MetricValue | None:
@@ -181,19 +183,21 @@ class ExperimentResult:
     @cached_property
     def derived_at(self) -> dict[DesignPoint, dict[str, MetricValue]]:
         """Setting -> key -> derived number, where there is one; over repeats the mean."""
-        at_points: dict[DesignPoint, dict[DesignPoint, dict[tuple[str, str], MetricValue]]] = {}
+        at_points: dict[DesignPoint, dict[tuple[str, str], MetricValue]] = {}
         for case in self.experiment.cases:
-            here = at_points.setdefault(self.experiment.setting(case.point), {}).setdefault(case.point, {})
+            here = at_points.setdefault(case.point, {})
             for key in self.spec.metrics:
                 if (value := self.value(case, key)) is not None:
                     here[case.run.name, key] = value
+        repeats: dict[DesignPoint, list[dict[str, MetricValue]]] = {}
+        for point, values in at_points.items():
+            repeats.setdefault(self.experiment.setting(point), []).append(derive(self.spec, values))
         means = {}
-        for setting, values_at in at_points.items():
-            several = [derive(self.spec, values) for values in values_at.values()]
+        for setting, several in repeats.items():
             every = {
                 key: [numbers[key] for numbers in several if key in numbers] for key in self.spec.derived
             }
-            over = {key: _over_repeats(values, len(several)) for key, values in every.items()}
+            over = {key: _over_repeats(numbers, len(several)) for key, numbers in every.items()}
             means[setting] = {key: mean for key, mean in over.items() if mean is not None}
         return means
 

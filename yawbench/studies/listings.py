@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -34,9 +34,6 @@ from yawbench.orchestrator.scenario import catalogue
 from yawbench.orchestrator.scenario.overrides import changed, with_changes
 from yawbench.vocabulary.motion import LEAST_SPEED
 from yawbench.vocabulary.wheels import WHEELS
-
-if TYPE_CHECKING:
-    from yawbench.orchestrator.results.reader import Results
 
 from .tables import Cell, Column, Table
 

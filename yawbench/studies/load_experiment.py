@@ -27,7 +27,7 @@ from yawbench.orchestrator.signal_names import Target
 from .axes import changes_of_file
 from .claim_schema import Claim, DerivedSpec
 from .experiment import FIGURES, LoadedExperiment, NamedRun
-from .references import problems_of
+from .problems import problems_of
 from .sampling import read_table
 from .schema import ChoiceSpec, ExperimentSpec, RunSpec
 from .sections import sections

@@ -23,7 +23,7 @@ from .claims import ClaimResult, Region
 from .experiment_result import ExperimentResult
 from .limits import limits_of
 from .result_tables import heading, measured_words, verdict
-from .tables import Table, column, to_csv
+from .tables import Cell, Column, Kind, Table, column, to_csv
 from .uncertainty import sample_columns
 
 if TYPE_CHECKING:
@@ -71,31 +71,26 @@ def columns_of(findings: ExperimentResult) -> Table:
 
 def verdict_columns(findings: ExperimentResult) -> Table:
     """Return columns with verdict, margin and region, a row per claim and check."""
-    every = findings.judgements
-    regions = [result.region for result in every]
-    bounds = [region.flip_bounds if region else None for region in regions]
-    flips = [region.flip if region else None for region in regions]
-    return Table.of_columns(
-        [
-            column("group", "string", [result.group for result in every]),
-            column("says", "string", [result.claim.says for result in every]),
-            column("verdict", "string", [verdict(result) for result in every]),
-            column("margin", "float64", [result.verdict.margin for result in every], {"unit": "1"}),
-            column("spread", "float64", [at.spread if at else None for at in regions], {"unit": "1"}),
-            column("points", "int64", [len(region.points) if region else None for region in regions]),
-            column("holds at", "int64", [region.holding if region else None for region in regions]),
-            column("flips", "int64", [region.flipping if region else None for region in regions]),
-            column(
-                "share from", "float64", [bound.low if bound else None for bound in bounds], {"unit": "1"}
-            ),
-            column("share to", "float64", [bound.high if bound else None for bound in bounds], {"unit": "1"}),
-            column("without result", "int64", [at.without_result if at else None for at in regions]),
-            column("flips by", "string", [flip.open_value if flip else None for flip in flips]),
-            column("flips at", "string", [flip.words if flip else None for flip in flips]),
-            column("chosen", "string", [(flip.chosen or None) if flip else None for flip in flips]),
-            column("robust", "string", [text_of(region.robust) if region else None for region in regions]),
-        ]
-    )
+    kinds: dict[str, Kind] = {
+        "group": "string", "says": "string", "verdict": "string", "margin": "float64", "spread": "float64",
+        "points": "int64", "holds at": "int64", "flips": "int64", "share from": "float64",
+        "share to": "float64", "without result": "int64", "flips by": "string", "flips at": "string",
+        "chosen": "string", "robust": "string",
+    }  # fmt: skip
+    shares = ("margin", "spread", "share from", "share to")
+    columns = [Column(name, kind, {"unit": "1"} if name in shares else {}) for name, kind in kinds.items()]
+    rows = []
+    for result in findings.judgements:
+        of_region: list[Cell] = [None] * 11
+        if region := result.region:
+            bounds, flip = region.flip_bounds, region.flip
+            of_flip = (flip.open_value, flip.words, flip.chosen or None) if flip else (None, None, None)
+            of_region = [
+                region.spread, len(region.points), region.holding, region.flipping, bounds.low, bounds.high,
+                region.without_result, *of_flip, text_of(region.robust),
+            ]  # fmt: skip
+        rows.append([result.group, result.claim.says, verdict(result), result.verdict.margin, *of_region])
+    return Table("", columns, rows)
 
 
 def _parquet(findings: ExperimentResult, table: Table) -> bytes:

@@ -17,9 +17,7 @@ from yawbench.figures.display import shown_value
 from yawbench.figures.latex import escaped
 from yawbench.foundation.errors import text_of
 from yawbench.foundation.messages import printable
-from yawbench.metrics.expressions import (
-    MetricValue,
-)
+from yawbench.metrics.expressions import MetricValue
 from yawbench.metrics.verdict import VerdictText
 from yawbench.orchestrator.results.reader import Results
 from yawbench.orchestrator.results.run_record import EventRecord
@@ -28,9 +26,6 @@ if TYPE_CHECKING:
     import pandas as pd
     import rich.console
     import rich.segment
-
-    from yawbench.orchestrator.results.reader import Results
-
 
 MARK = "†"
 """Mark after the name of a run with plausibility warnings."""

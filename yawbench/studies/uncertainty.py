@@ -47,7 +47,7 @@ from .axes import RUN, Level
 from .claims import judge
 from .confidence import TAIL, ConfidenceInterval, interval, jackknife, share_bounds
 from .experiment import Case, NamedRun
-from .experiment_result import ExperimentResult
+from .experiment_result import ExperimentResult, within
 from .sampling import runs_of_design
 from .tables import Cell, Kind, Table, column
 
@@ -309,7 +309,7 @@ def _with_bounds(estimate: Estimate | None, unit: str) -> MetricValue | None:
     number, low, high = estimate
     if low is None or high is None:
         return MetricValue(number, unit)
-    return MetricValue(number, unit, max(high - number, number - low), (low, high))
+    return within(number, unit, low, high)
 
 
 def _finite(findings: ExperimentResult, group: Group, key: str) -> tuple[np.ndarray, int]:
