@@ -389,18 +389,10 @@ def test_measured_columns_under_other_names_units_and_signs_give_the_same(tmp_pa
     assert mentions([why["message"] for why in found["diagnostics"]], "sideslip", "spin", "ratios")
 
 
-UNITS_GIVEN = {
-    "in the header": "Zeit [ms],LRW [deg],Gier [deg/s],ay [cm/s2]\n",
-    "in a row": "Zeit,LRW,Gier,ay\nms,deg,deg/s,cm/s2\n",
-    "in a row with brackets": "Zeit,LRW,Gier,ay\n[ms],[deg],[deg/s],[cm/s2]\n",
-    "mixed": "Zeit [ms],LRW,Gier,ay\n-,deg,deg/s,cm/s2\n",
-}
-
-
-@pytest.mark.parametrize("heading", UNITS_GIVEN.values(), ids=UNITS_GIVEN)
-def test_units_of_measured_columns_are_read_from_the_file(heading, tmp_path):
+def test_units_may_stand_in_the_header_and_in_a_row_below(tmp_path):
     made, file = trace(sampling=SAMPLING["200 Hz"]), tmp_path / "run.csv"
     write_measured(made, file)
+    heading = "Zeit [ms],LRW,Gier,ay\n-,deg,deg/s,cm/s2\n"
     file.write_text(heading + file.read_text().partition("\n")[2])
     (tmp_path / "map.yaml").write_text(
         "files: [run.csv]\ntime: Zeit\n"
