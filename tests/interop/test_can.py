@@ -11,7 +11,6 @@ import pytest
 import yawbench as yb
 from tests.cars import make_plan
 from tests.changed import changed
-from tests.conftest import put_fmus
 from tests.fmus.fake_fmus import Var, make_fmu
 from tests.refusals import mentions, refused
 from yawbench.foundation.errors import ScenarioError, YawbenchError
@@ -58,28 +57,21 @@ CHANNELS = {
 SI = {"m/s2": 1.0, "deg/s": math.pi / 180, "g": 9.80665, "km/h": 1 / 3.6 / RADIUS}
 
 
-@pytest.fixture
-def dbc(tmp_path) -> Path:
-    path = tmp_path / "car.dbc"
+@pytest.fixture(scope="module")
+def dbc(tmp_path_factory) -> Path:
+    path = tmp_path_factory.mktemp("dbc") / "car.dbc"
     path.write_text(DBC, encoding="cp1252")
     return path
 
 
 @pytest.fixture(scope="module")
-def run(tmp_path_factory):
+def run(dbc, fmus, tmp_path_factory):
     """The results of a run with a sensor that has the numbers of the network."""
-    tmp_path = tmp_path_factory.mktemp("can")
-    fmus, dbc = tmp_path / "fmus", tmp_path / "car.dbc"
-    fmus.mkdir()
-    put_fmus(fmus, components=UNITS)
-    dbc.write_text(DBC, encoding="cp1252")
     given = sensor_parameters(read_dbc(dbc), CHANNELS, wheel_radius=RADIUS)
     settings = [f"sensor.{name}={value!r}" for name, value in given.items()]
-    scenario = load_scenario(
-        SCENARIO, changes=changed(swaps=["sensor=sensor_ideal"], settings=settings, stop_time=3)
-    )
-    simulate(make_plan(scenario, fmus=fmus), tmp_path / "out")
-    return load_results(tmp_path / "out")
+    changes = changed(swaps=["sensor=sensor_ideal"], settings=settings, stop_time=3)
+    plan = make_plan(load_scenario(SCENARIO, changes=changes), fmus=fmus)
+    return load_results(simulate(plan, tmp_path_factory.mktemp("can") / "out").folder)
 
 
 def test_every_message_of_a_run_is_what_the_network_carries(dbc, run):
@@ -110,9 +102,9 @@ def test_every_message_of_a_run_is_what_the_network_carries(dbc, run):
 
 
 @pytest.mark.parametrize("ending", ["blf", "asc"])
-def test_a_log_of_a_run_is_a_recording_of_its_messages(dbc, run, tmp_path, yawbench, ending):
+def test_a_log_of_a_run_is_a_recording_of_its_messages(dbc, run, yawbench, ending):
     pytest.importorskip("can")
-    log = tmp_path / f"run.{ending}"
+    log = dbc.with_name(f"run.{ending}")
     pairs = {
         "yaw_rate": "Inertial.YawRate",
         "acceleration_y": "Inertial.LateralAcceleration",
@@ -132,18 +124,19 @@ def test_a_log_of_a_run_is_a_recording_of_its_messages(dbc, run, tmp_path, yawbe
         file.column("YawRat", "time")
 
 
-def test_a_log_is_a_recording_of_a_measured_car_and_a_time_series_of_an_input(dbc, run, tmp_path):
+def test_a_log_is_a_recording_of_a_measured_car_and_a_time_series_of_an_input(dbc, run):
     pytest.importorskip("can")
+    folder = dbc.parent
     rate = run["sensor.yaw_rate"][::4]
-    assert write_log(run, dbc, {"sensor.yaw_rate": "Inertial.YawRate"}, tmp_path / "run.blf") == rate.size
-    (tmp_path / "car.yaml").write_text("files: [run.blf]\nsignals: {yaw_rate: YawRate}\n")
-    assert yb.measured(tmp_path / "car.yaml")["yaw_rate"] == pytest.approx(rate, abs=1e-9)
-    make_fmu(tmp_path / "a.fmu", inputs=[Var("rate", "rad/s")], outputs=["y"])
-    (tmp_path / "s.yaml").write_text(
+    assert write_log(run, dbc, {"sensor.yaw_rate": "Inertial.YawRate"}, folder / "run.blf") == rate.size
+    (folder / "car.yaml").write_text("files: [run.blf]\nsignals: {yaw_rate: YawRate}\n")
+    assert yb.measured(folder / "car.yaml")["yaw_rate"] == pytest.approx(rate, abs=1e-9)
+    make_fmu(folder / "a.fmu", inputs=[Var("rate", "rad/s")], outputs=["y"])
+    (folder / "s.yaml").write_text(
         "stop_time: 3\nstep_size: 0.01\nunits: {a: {fmu: ./a.fmu}}\n"
         "inputs: {a.rate: {file: run.blf, column: YawRate, interpolation: held}}\n"
     )
-    (unit,) = make_plan(load_scenario(tmp_path / "s.yaml")).instances
+    (unit,) = make_plan(load_scenario(folder / "s.yaml")).instances
     assert unit.series["rate"].values == pytest.approx(rate, abs=1e-12)
 
 

@@ -9,8 +9,6 @@ import numpy as np
 import pytest
 
 from tests.compare_fmpy import Comparison, compared, differences, table
-from tests.conftest import compiled
-from tests.fmus import models3
 from tests.fmus.models3 import make_fmu
 from tests.orchestrator.test_foreign import write_fmu
 
@@ -28,12 +26,10 @@ UNITS = ["plant_two_dof"]
     ],
 )
 def test_values_here_are_those_of_an_fmpy_loop_to_the_last_bit(
-    names, run_in_neither, tmp_path, library, fmus, capsys
+    names, run_in_neither, tmp_path, library, models, fmus, capsys
 ):
     folder = tmp_path / "foreign"
     folder.mkdir()
-    (tmp_path / "stubs.h").write_text(models3.stubs(), encoding="utf-8")
-    models = compiled(models3.HERE / "models3.c", tmp_path / "models3.so", f"-I{tmp_path}")
     for name in {*names, *run_in_neither} - {"foreign", *UNITS}:
         make_fmu(folder, name, models)
     make_fmu(folder, "Dahlquist", models, interface="ModelExchange")

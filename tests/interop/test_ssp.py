@@ -240,6 +240,9 @@ def test_a_start_value_of_a_connected_input_counts_for_nothing(feedback, fmus, t
     assert "steer_angle" not in unit_of(plan, "plant").constants | unit_of(plan, "plant").parameters
 
 
+TO_PLANT = 'startConnector="steer_angle" endElement="plant"'
+
+
 @pytest.mark.parametrize(
     ("before", "after", "names"),
     [
@@ -250,14 +253,10 @@ def test_a_start_value_of_a_connected_input_counts_for_nothing(feedback, fmus, t
         ('implementation="CoSimulation"', 'implementation="ModelExchange"', ("CoSimulation", "supported")),
         ("<ssd:Elements>", '<ssd:Elements><ssd:Other name="x"/>', ("Other", "element", "kind")),
         ('name="tyre"', 'name="plant"', ("'plant'", "elements")),
+        (TO_PLANT, TO_PLANT.replace("steer_angle", "steer"), ("'steer'", "driver")),
         (
-            'startConnector="steer_angle" endElement="plant"',
-            'startConnector="steer" endElement="plant"',
-            ("'steer'", "driver"),
-        ),
-        (
-            'startConnector="steer_angle" endElement="plant" endConnector="steer_angle"',
-            'startConnector="velocity_x" endElement="plant" endConnector="steer_angle"',
+            f'{TO_PLANT} endConnector="steer_angle"',
+            f'{TO_PLANT.replace("steer_angle", "velocity_x")} endConnector="steer_angle"',
             ("driver.velocity_x", "plant.steer_angle"),
         ),
         (
@@ -312,21 +311,11 @@ def test_an_archive_without_a_stop_time_asks_for_one(feedback, fmus, tmp_path):
     assert make_plan(load_scenario(path, changes=changed(stop_time=0.2)), fmus=fmus).n_steps == 200
 
 
-@pytest.mark.parametrize(
-    ("xml", "says"),
-    [
-        ('<fmiModelDescription fmiVersion="1.0"/>', "FMI 1.0"),
-        ('<fmiModelDescription fmiVersion="3.0"><CoSimulation/></fmiModelDescription>', "FMI 3.0"),
-        ("<fmiModel", "modelDescription.xml"),
-    ],
-)
-def test_a_component_that_cannot_be_run_is_named(xml, says, feedback, fmus, tmp_path):
+def test_a_component_that_cannot_be_run_is_named(feedback, fmus, tmp_path):
     member = "resources/plant_two_dof.fmu"
-    content = make_fmu(tmp_path / "plant.fmu", xml=xml).read_bytes()
+    content = make_fmu(tmp_path / "plant.fmu", xml='<fmiModelDescription fmiVersion="1.0"/>').read_bytes()
     path = redescribed(feedback, tmp_path / "other.ssp", described(feedback), {member: content})
-    sentence = problem(path, fmus)
-    assert member in sentence
-    assert says in sentence
+    assert mentions(problem(path, fmus), member, "FMI 1.0")
 
 
 def test_entities_are_not_expanded_and_no_file_is_read_for_them(feedback, fmus, tmp_path):
@@ -342,7 +331,7 @@ def test_entities_are_not_expanded_and_no_file_is_read_for_them(feedback, fmus, 
     assert mentions(problem(path, fmus), "has no value")
 
 
-@pytest.mark.parametrize("content", [b"", b"no zip", b"PK\x03\x04 cut off"])
+@pytest.mark.parametrize("content", [b"", b"PK\x03\x04 cut off"])
 def test_what_is_no_archive_is_said_in_one_sentence(tmp_path, fmus, content):
     archive = tmp_path / "broken.ssp"
     archive.write_bytes(content)

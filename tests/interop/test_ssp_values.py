@@ -12,7 +12,6 @@ from lxml import etree
 
 from tests.changed import changed
 from tests.command_line import status_of
-from tests.conftest import compiled
 from tests.fmus import models3
 from tests.fmus.fake_fmus import Var, make_fmu
 from tests.refusals import mentions, refused, texts_of
@@ -425,11 +424,9 @@ ODD = {
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="compiles for Linux")
-def test_an_archive_of_arrays_and_all_types_gives_the_same_bits(tmp_path, capsys):
-    (tmp_path / "stubs.h").write_text(models3.stubs(), encoding="utf-8")
-    library = compiled(models3.HERE / "models3.c", tmp_path / "models3.so", f"-I{tmp_path}")
+def test_an_archive_of_arrays_and_all_types_gives_the_same_bits(models, tmp_path, capsys):
     for model in ("Every", "Matrix"):
-        models3.make_fmu(tmp_path, model, library)
+        models3.make_fmu(tmp_path, model, models)
     numbers = {"m.u[2]": 0.3, "n.u[1]": 7.0}
     data = {
         "stop_time": 0.5,

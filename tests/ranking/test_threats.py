@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from tests.checkout import ROOT
+from tests.ranking.test_ranking import SMALL as RANKING
 from tests.ranking.test_ranking import rows
 from tests.refusals import mentions
 from tests.reports.made_up import unpacked
@@ -28,7 +29,6 @@ from yawbench.ranking.threat_scores import (
 )
 from yawbench.ranking.threat_tables import car_tables
 from yawbench.ranking.threats import LoadedThreats, QuantitySpec, SearchPlace, ThreatSpec, load_threats
-from yawbench.reports.page_parts import _templates
 from yawbench.studies.executor import side_by_side
 
 UNITS = (
@@ -261,25 +261,9 @@ threats:
 settings:
   main: {{title: main, limit: 10000}}
 """
-RANKING = f"""
-title: small
-step_size: 0.005
-stop_time: 5.5
-cars:
-  s:
+OTHER_CAR = f"""  other:
     title: hard
     vehicle: {ROOT}/scenarios/vehicles/hard.yaml
-    slow_steer: {GROUND}/slowly_increasing_steer.yaml
-conditions:
-  dry: {{title: dry, car: s, scenario: {GROUND}/sine_with_dwell.yaml}}
-entries:
-  none: {{title: no control, fmu: controller_off, source: the car alone}}
-  fuzzy_pid: {{title: fuzzy PID, fmu: controller_fuzzy_pid, source: paper C}}
-"""
-
-OTHER_CAR = f"""  other:
-    title: soft
-    vehicle: {ROOT}/scenarios/vehicles/saloon75.yaml
     slow_steer: {GROUND}/slowly_increasing_steer.yaml
 """
 
@@ -307,28 +291,6 @@ def test_a_setting_of_some_cars_has_tables_of_these_alone(tmp_path):
     assert list(table.headings) == ["controller", "s"]
 
 
-@pytest.mark.exhaustive
-def test_two_runs_from_nothing_give_the_same_tables(tmp_path, yawbench, monkeypatch):
-    """Each with an empty cache and its own number of processes."""
-    file = small(tmp_path)
-    shared = _templates("yawbench.ranking").globals
-    monkeypatch.setitem(shared, "now", lambda: "one day")  # the runs may end in two minutes
-    for out, jobs in (("first", 1), ("second", 2)):
-        monkeypatch.setenv("YAWBENCH_CACHE", str(tmp_path / f"cache of {out}"))
-        status, _, said = yawbench("rank", file, "--out", tmp_path / out, "--jobs", jobs)
-        assert status == 0, said
-    for name in ("levels.csv", "scores.csv", "quantities.csv", "report.html"):
-        first, second = ((tmp_path / out / name).read_bytes() for out in ("first", "second"))
-        assert first.replace(b"/first", b"") == second.replace(b"/second", b""), name
-    levels = {one["entry"]: one for one in rows(tmp_path / "first" / "levels.csv")}
-    assert [levels[entry]["end"] for entry in ("none", "fuzzy_pid")] == ["easy", ""]
-    assert 0.1 < float(levels["fuzzy_pid"]["level"]) < 0.9
-    scores = rows(tmp_path / "first" / "scores.csv")
-    assert [(one["entry"], float(one["score"])) for one in scores] == [("fuzzy_pid", 100.0), ("none", 0.0)]
-    page = unpacked(tmp_path / "first" / "report.html")
-    assert "fuzzy PID" in page and "fails at 0.90" in page and " on one day. " in page
-
-
 NONE = "main,friction,s,none,0.9,,0.0,easy"
 
 
@@ -337,8 +299,10 @@ def test_an_entry_joins_the_published_levels_with_its_own_runs(tmp_path, yawbenc
     options = ("--only", "fuzzy_pid", "--out", tmp_path / "out", "--jobs", 1)
     status, _, said = yawbench("rank", file, *options)
     assert status == 0, said
-    assert [one["entry"] for one in rows(tmp_path / "out" / "scores.csv")] == ["fuzzy_pid", "none"]
-    assert "Published levels" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    scores = rows(tmp_path / "out" / "scores.csv")
+    assert [(one["entry"], float(one["score"])) for one in scores] == [("fuzzy_pid", 100.0), ("none", 0.0)]
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "Published levels" in page and "fails at 0.90" in unpacked(page)
 
 
 def test_a_setting_that_is_chosen_is_searched_and_the_others_count_as_published(tmp_path, yawbench):
