@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -27,7 +26,6 @@ from yawbench.interop.second_opinion import (
     second_opinion,
     still_signals,
 )
-from yawbench.orchestrator.master.simulate import simulate_in_memory
 from yawbench.vocabulary.wheels import WHEELS
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
@@ -132,14 +130,6 @@ def test_signals_that_do_not_change_are_told_and_names_are_printed_whole(capsys)
     assert mentions(said(*still), "3", "4 signals", "a.rounded")
     assert mentions(said(*gaps).splitlines()[-1], "changes", "agreement", "evidence")
     assert "Constant" not in said() and "a.x[1]" in said()
-
-
-def test_the_example_of_the_documentation_compares_signals_that_move(fmus, tmp_path):
-    text = (SCENARIOS.parent / "docs/other_tools.md").read_text()
-    (command,) = re.findall(r"second-opinion scenarios/(\S+) --set stop_time=(\S+)", text)
-    results = simulate_in_memory(plan_of(fmus, command[0], float(command[1])))
-    for name in ("driver.steer_angle", "plant.yaw_rate", "plant.sideslip", "controller.yaw_moment"):
-        assert np.ptp(results.columns[results.column(name)]) > 1e-3, name
 
 
 def test_a_master_that_is_not_installed_costs_a_sentence(fmus, tmp_path):

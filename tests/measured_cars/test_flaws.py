@@ -181,9 +181,8 @@ def jittered(
 
 
 @pytest.mark.sampled(2)
-@pytest.mark.parametrize("driven", [drive, lane_changes])
-@pytest.mark.parametrize("car", [SALOON, SPORT], ids=["saloon", "sport"])
 @pytest.mark.parametrize("which", JITTERS)
+@pytest.mark.parametrize("car, driven", [(SALOON, drive), (SPORT, lane_changes)], ids=["saloon", "sport"])
 def test_jitter_hides_no_flaw(which, car, driven, tmp_path):
     whole = recording(1, car, driven)
     (alone,) = flaws_of(write(tmp_path, *jittered(whole, which)))
