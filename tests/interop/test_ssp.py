@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 import zipfile
 from copy import deepcopy
 from dataclasses import replace
@@ -51,14 +52,43 @@ def results_of(plan, folder):
     return (folder / "results.csv").read_bytes()
 
 
-def rewritten(archive, target, *changes):
-    """Copy an archive with pieces of its description replaced."""
-    with zipfile.ZipFile(archive) as held:
-        content = held.read(DESCRIPTION_FILE)
-    for before, after in changes:
-        assert before.encode() in content
-        content = content.replace(before.encode(), after.encode())
-    return redescribed(archive, target, content)
+class Archive:
+    """A copy of the archive of the smallest scenario, to be edited and planned."""
+
+    def __init__(self, path, fmus):
+        self.path, self.fmus = path, fmus
+
+    def write(self, description, members=None):
+        """Put in another description, a text or a tree, and other members; return the archive."""
+        content = description if isinstance(description, bytes) else etree.tostring(description)
+        with zipfile.ZipFile(self.path) as old:
+            every = {name: old.read(name) for name in old.namelist()}
+        with zipfile.ZipFile(self.path, "w") as new:
+            for name, held in (every | {DESCRIPTION_FILE: content, **(members or {})}).items():
+                new.writestr(name, held)
+        return self
+
+    def replace(self, *changes):
+        """Replace pieces of the description; return the archive."""
+        content = etree.tostring(described(self.path)).decode()
+        for before, after in changes:
+            assert before in content
+            content = content.replace(before, after)
+        return self.write(content.encode())
+
+    def plan(self, **changes):
+        return make_plan(load_scenario(self.path, changes=changed(**changes)), fmus=self.fmus)
+
+    def problem(self):
+        with pytest.raises(YawbenchError) as error:
+            self.plan()
+        (sentence,) = texts_of(error.value)
+        return sentence
+
+
+@pytest.fixture
+def archive(feedback, fmus, tmp_path):
+    return Archive(Path(shutil.copy(feedback, tmp_path / "copy.ssp")), fmus)
 
 
 def described(archive):
@@ -66,25 +96,8 @@ def described(archive):
         return etree.fromstring(held.read(DESCRIPTION_FILE))
 
 
-def redescribed(archive, target, description, members=None):
-    """Copy an archive with another description, a text or a tree, and other members."""
-    content = description if isinstance(description, bytes) else etree.tostring(description)
-    others = {DESCRIPTION_FILE: content, **(members or {})}
-    with zipfile.ZipFile(archive) as old, zipfile.ZipFile(target, "w") as new:
-        for name in old.namelist():
-            new.writestr(name, others.get(name) or old.read(name))
-    return target
-
-
 def unit_of(plan, name):
     return next(unit for unit in plan.instances if unit.name == name)
-
-
-def problem(archive, fmus, **options):
-    with pytest.raises(YawbenchError) as error:
-        make_plan(load_scenario(archive, changes=changed(**options)), fmus=fmus)
-    (sentence,) = texts_of(error.value)
-    return sentence
 
 
 def every_scenario():
@@ -163,29 +176,25 @@ def test_a_text_that_xml_cannot_hold_is_refused(fmus, tmp_path):
     assert not (tmp_path / "system.ssp").exists()
 
 
-def test_an_input_that_an_archive_leaves_alone_keeps_its_start_value(feedback, fmus, tmp_path):
-    root = described(feedback)
-    for connection in root.findall(".//{*}Connection"):
-        if connection.get("endConnector") == "yaw_moment":
-            connection.getparent().remove(connection)
-    plan = make_plan(load_scenario(redescribed(feedback, tmp_path / "open.ssp", root)), fmus=fmus)
-    assert unit_of(plan, "plant").constants["yaw_moment"] == 0.0
+def test_an_input_that_an_archive_leaves_alone_keeps_its_start_value(archive):
+    root = described(archive.path)
+    for connection in root.findall(".//{*}Connection[@endConnector='yaw_moment']"):
+        connection.getparent().remove(connection)
+    assert unit_of(archive.write(root).plan(), "plant").constants["yaw_moment"] == 0.0
 
 
-def test_start_and_end_of_a_connection_say_nothing_of_its_direction(feedback, fmus, tmp_path):
-    root = described(feedback)
+def test_start_and_end_of_a_connection_say_nothing_of_its_direction(archive):
+    wires, root = archive.plan().wires, described(archive.path)
     for one in root.findall(".//{*}Connection"):
         for what in ("Element", "Connector"):
             start, end = one.get(f"start{what}"), one.get(f"end{what}")
             one.set(f"start{what}", end)
             one.set(f"end{what}", start)
-    turned = make_plan(load_scenario(redescribed(feedback, tmp_path / "turned.ssp", root)), fmus=fmus)
-    assert turned.wires == make_plan(load_scenario(feedback), fmus=fmus).wires
+    assert archive.write(root).plan().wires == wires
 
 
-def nested(feedback, element):
-    """Return a description with one component in a system of its own, behind connectors of it."""
-    root = described(feedback)
+def nested(root, element):
+    """Put a component of a description into a system of its own, behind connectors of it."""
     component = root.find(f".//{{*}}Component[@name='{element}']")
     inner = etree.Element(f"{{{SSD}}}System", name="inner")
     component.getparent().replace(component, inner)
@@ -200,44 +209,41 @@ def nested(feedback, element):
         for end in ("startElement", "endElement"):
             if connection.get(end) == element:
                 connection.set(end, "inner")
-    return root
 
 
-def test_a_system_in_the_system_is_laid_flat(feedback, fmus, tmp_path):
-    root = nested(feedback, "tyre")
+def test_a_system_in_the_system_is_laid_flat(archive, tmp_path):
+    outside, root = results_of(archive.plan(), tmp_path / "outside"), described(archive.path)
+    nested(root, "tyre")
     etree.XMLSchema(file=str(SCHEMAS / "SystemStructureDescription.xsd")).assertValid(root)
-    plan = make_plan(load_scenario(redescribed(feedback, tmp_path / "nested.ssp", root)), fmus=fmus)
+    plan = archive.write(root).plan()
     assert any("inner_tyre (inner.tyre)" in note for note in texts_of(plan))
-    inside = results_of(plan, tmp_path / "inside").replace(b"inner_", b"")
-    assert inside == results_of(make_plan(load_scenario(feedback), fmus=fmus), tmp_path / "outside")
+    assert results_of(plan, tmp_path / "inside").replace(b"inner_", b"") == outside
 
 
-def test_names_that_cannot_name_a_unit_are_changed(feedback, fmus, tmp_path):
-    path = rewritten(
-        feedback, tmp_path / "named.ssp", ('name="plant"', 'name="vehicle"'), ('t="plant"', 't="vehicle"'),
+def test_names_that_cannot_name_a_unit_are_changed(archive):
+    archive.replace(
+        ('name="plant"', 'name="vehicle"'), ('t="plant"', 't="vehicle"'),
         ('name="tyre"', 'name="Four tyres.v2"'), ('t="tyre"', 't="Four tyres.v2"'),
     )  # fmt: skip
-    root = described(path)
+    root = described(archive.path)
     own = root.find(".//{urn:yawbench:ssp:1}Scenario")
     for record in list(own):
         own.remove(record)
-    plan = make_plan(load_scenario(redescribed(path, tmp_path / "recorded.ssp", root)), fmus=fmus)
+    plan = archive.write(root).plan()
     names = {"driver", "reference", "controller", "_vehicle", "Four_tyres_v2"}
     assert {unit.name for unit in plan.instances} == names
     assert mentions(texts_of(plan), "_vehicle (vehicle)", "Four_tyres_v2")
 
 
-def test_a_value_for_what_nothing_has_is_passed_over_with_a_note(feedback, fmus, tmp_path):
-    path = rewritten(feedback, tmp_path / "typo.ssp", ('name="initial_speed"', 'name="speed"'))
-    plan = make_plan(load_scenario(path), fmus=fmus)
+def test_a_value_for_what_nothing_has_is_passed_over_with_a_note(archive):
+    plan = archive.replace(('name="initial_speed"', 'name="speed"')).plan()
     assert "initial_speed" not in unit_of(plan, "plant").parameters
     assert mentions(texts_of(plan), "plant.speed", "values")
 
 
-def test_a_start_value_of_a_connected_input_counts_for_nothing(feedback, fmus, tmp_path):
-    path = rewritten(feedback, tmp_path / "start.ssp", ('name="initial_speed"', 'name="steer_angle"'))
-    plan = make_plan(load_scenario(path), fmus=fmus)
-    assert "steer_angle" not in unit_of(plan, "plant").constants | unit_of(plan, "plant").parameters
+def test_a_start_value_of_a_connected_input_counts_for_nothing(archive):
+    plant = unit_of(archive.replace(('name="initial_speed"', 'name="steer_angle"')).plan(), "plant")
+    assert "steer_angle" not in plant.constants | plant.parameters
 
 
 TO_PLANT = 'startConnector="steer_angle" endElement="plant"'
@@ -272,68 +278,52 @@ TO_PLANT = 'startConnector="steer_angle" endElement="plant"'
         ("</ssd:System>", "", ("not well-formed",)),
     ],
 )
-def test_what_an_archive_cannot_mean_here_is_said_in_one_sentence(
-    feedback, fmus, tmp_path, before, after, names
-):
-    archive = rewritten(feedback, tmp_path / "changed.ssp", (before, after))
-    sentence = problem(archive, fmus)
-    assert sentence.startswith(str(archive))
+def test_what_an_archive_cannot_mean_here_is_said_in_one_sentence(archive, before, after, names):
+    sentence = archive.replace((before, after)).problem()
+    assert sentence.startswith(str(archive.path))
     assert mentions(sentence, *names)
 
 
-def test_an_archive_without_a_step_asks_for_one_and_takes_it(feedback, fmus, tmp_path):
-    path = rewritten(
-        feedback,
-        tmp_path / "no_step.ssp",
-        ("osp:FixedStepAlgorithm", "osp:Other"),
-        ("oms:FixedStepMaster", "oms:Other"),
-        ("yawbench:Scenario", "ssc:Other"),
-    )
-    assert mentions(problem(path, fmus), path, "communication step", "--set step_size=0.001")
-    plan = make_plan(load_scenario(path, changes=changed(step_size=0.0025)), fmus=fmus)
+NO_STEP = ("osp:FixedStepAlgorithm", "osp:Other"), ("yawbench:Scenario", "ssc:Other")
+
+
+def test_an_archive_without_a_step_asks_for_one_and_takes_it(archive):
+    archive.replace(*NO_STEP, ("oms:FixedStepMaster", "oms:Other"))
+    assert mentions(archive.problem(), archive.path, "communication step", "--set step_size=0.001")
+    plan = archive.plan(step_size=0.0025)
     assert (plan.n_steps, plan.algorithm) == (240, "extrapolated")
 
 
-def test_the_step_of_an_archive_of_omsimulator_is_taken(feedback, fmus, tmp_path):
-    path = rewritten(
-        feedback,
-        tmp_path / "oms.ssp",
-        ("<osp:FixedStepAlgorithm", "<osp:Other"),
-        ('oms-ma" stepSize="0.001"', 'oms-ma" stepSize="0.000500"'),
-        ("yawbench:Scenario", "ssc:Other"),
-    )
-    assert make_plan(load_scenario(path), fmus=fmus).step == Fraction(1, 2000)
+def test_the_step_of_an_archive_of_omsimulator_is_taken(archive):
+    archive.replace(*NO_STEP, ('oms-ma" stepSize="0.001"', 'oms-ma" stepSize="0.000500"'))
+    assert archive.plan().step == Fraction(1, 2000)
 
 
-def test_an_archive_without_a_stop_time_asks_for_one(feedback, fmus, tmp_path):
-    path = rewritten(feedback, tmp_path / "endless.ssp", ('stopTime="0.6"', ""))
-    assert mentions(problem(path, fmus), "archive", "stop", "time")
-    assert make_plan(load_scenario(path, changes=changed(stop_time=0.2)), fmus=fmus).n_steps == 200
+def test_an_archive_without_a_stop_time_asks_for_one(archive):
+    archive.replace(('stopTime="0.6"', ""))
+    assert mentions(archive.problem(), "archive", "stop", "time")
+    assert archive.plan(stop_time=0.2).n_steps == 200
 
 
-def test_a_component_that_cannot_be_run_is_named(feedback, fmus, tmp_path):
+def test_a_component_that_cannot_be_run_is_named(archive, tmp_path):
     member = "resources/plant_two_dof.fmu"
     content = make_fmu(tmp_path / "plant.fmu", xml='<fmiModelDescription fmiVersion="1.0"/>').read_bytes()
-    path = redescribed(feedback, tmp_path / "other.ssp", described(feedback), {member: content})
-    assert mentions(problem(path, fmus), member, "FMI 1.0")
+    archive.write(described(archive.path), {member: content})
+    assert mentions(archive.problem(), member, "FMI 1.0")
 
 
-def test_entities_are_not_expanded_and_no_file_is_read_for_them(feedback, fmus, tmp_path):
+def test_entities_are_not_expanded_and_no_file_is_read_for_them(archive, tmp_path):
     secret = tmp_path / "secret"
     secret.write_text("90")
     declared = f'<!DOCTYPE a [<!ENTITY e SYSTEM "{secret.as_uri()}">]><ssd:SystemStructureDescription '
-    path = rewritten(
-        feedback,
-        tmp_path / "entity.ssp",
-        ("<ssd:SystemStructureDescription ", declared),
-        ('<ssv:Real value="25.0" unit="m/s"/>', "&e;"),
-    )
-    assert mentions(problem(path, fmus), "has no value")
+    value = '<ssv:Real value="25.0" unit="m/s"/>'
+    archive.replace(("<ssd:SystemStructureDescription ", declared), (value, "&e;"))
+    assert mentions(archive.problem(), "has no value")
 
 
-@pytest.mark.parametrize("content", [b"", b"PK\x03\x04 cut off"])
-def test_what_is_no_archive_is_said_in_one_sentence(tmp_path, fmus, content):
-    archive = tmp_path / "broken.ssp"
-    archive.write_bytes(content)
-    assert problem(archive, fmus).startswith(f"{archive}: ")
-    assert mentions(problem(tmp_path / "missing.ssp", fmus), "missing.ssp", "archive")
+@pytest.mark.parametrize("content", [b"", b"PK\x03\x04 cut off", None])
+def test_what_is_no_archive_is_said_in_one_sentence(archive, content):
+    archive.path.unlink()
+    if content is not None:
+        archive.path.write_bytes(content)
+    assert mentions(archive.problem(), f"{archive.path}: ", "archive")

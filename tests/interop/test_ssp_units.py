@@ -8,7 +8,16 @@ from pathlib import Path
 import pytest
 
 from tests.fmus.fake_fmus import Var, make_fmu, out
-from tests.interop.test_ssp_values import description, inline, pack, parameter, parameters, plan_of, problem
+from tests.interop.test_ssp_values import (
+    description,
+    inline,
+    pack,
+    parameter,
+    parameters,
+    plan_of,
+    problem,
+    wire,
+)
 from tests.refusals import each_mentions, mentions, refused
 from yawbench.foundation.errors import YawbenchError
 from yawbench.interop.ssp_write import for_omsimulator, system_structure, write_ssp
@@ -37,17 +46,6 @@ def component(name: str, *connectors: str, more: str = "") -> str:
         f'<ssd:Component name="{name}" source="resources/{name}.fmu">'
         f"<ssd:Connectors>{''.join(connectors)}</ssd:Connectors>{more}</ssd:Component>"
     )
-
-
-def wire(start: str, end: str, inner: str = "", **attributes: str) -> str:
-    ends = zip(("start", "end"), (start, end), strict=True)
-    named = [
-        f'{which}Element="{e}" {which}Connector="{c}"'
-        for which, one in ends
-        for e, _, c in [one.partition(".")]
-    ]
-    more = " ".join(f'{key}="{value}"' for key, value in attributes.items())
-    return f"<ssd:Connection {' '.join(named)} {more}>{inner}</ssd:Connection>"
 
 
 def archive(

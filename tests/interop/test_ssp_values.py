@@ -55,6 +55,13 @@ def inline(content: str, mapping: str = "") -> str:
     return binding(f"<ssd:ParameterValues>{content}</ssd:ParameterValues>{mapping}")
 
 
+def wire(start: str, end: str, inner: str = "", **attributes: str) -> str:
+    (of, output), (to, input_) = start.split("."), end.split(".")
+    ends = {"startElement": of, "startConnector": output, "endElement": to, "endConnector": input_}
+    given = " ".join(f'{key}="{value}"' for key, value in {**ends, **attributes}.items())
+    return f"<ssd:Connection {given}>{inner}</ssd:Connection>"
+
+
 def description(
     bindings: str,
     *,
@@ -376,27 +383,22 @@ def test_values_for_another_number_of_elements_are_refused(name, inner, says, tm
 TWO = MATRIX + MATRIX.replace('name="m"', 'name="n"')
 
 
-def wires(folder: Path, start: str, end: str, indices: str = "") -> set[str]:
-    (from_, output), (to, input_) = start.split("."), end.split(".")
-    connection = (
-        f'<ssd:Connection startElement="{from_}" startConnector="{output}" endElement="{to}"'
-        f' endConnector="{input_}" {indices}/>'
-    )
-    plan = plan_of(matrix(folder, elements=TWO, connections=connection))
-    return {f"{wire.output}->{wire.input}" for wire in plan.wires}
+def wires(folder: Path, start: str, end: str, **indices: str) -> set[str]:
+    plan = plan_of(matrix(folder, elements=TWO, connections=wire(start, end, **indices)))
+    return {f"{one.output}->{one.input}" for one in plan.wires}
 
 
 def test_a_connection_of_arrays_connects_their_elements(tmp_path):
     assert wires(tmp_path, "m.y", "n.u") == {"y[1]->u[1]", "y[2]->u[2]"}
     assert wires(tmp_path, "m.result", "n.force") == {"y[1]->u[1]", "y[2]->u[2]"}
-    assert wires(tmp_path, "m.y", "n.u", 'startIndices="2" endIndices="1"') == {"y[2]->u[1]"}
+    assert wires(tmp_path, "m.y", "n.u", startIndices="2", endIndices="1") == {"y[2]->u[1]"}
     assert wires(tmp_path, "m.y[2]", "n.u[1]") == {"y[2]->u[1]"}
 
 
 @pytest.mark.parametrize("indices", ["0", "3", "1 1", "x"])
 def test_an_index_that_an_array_lacks_is_refused(indices, tmp_path):
     with refused(YawbenchError, names=(f"'{indices}'", "counted from 1")):
-        wires(tmp_path, "m.y", "n.u", f'startIndices="{indices}" endIndices="1"')
+        wires(tmp_path, "m.y", "n.u", startIndices=indices, endIndices="1")
 
 
 def test_arrays_pass_the_connectors_of_systems(tmp_path):

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
+from collections import namedtuple
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
@@ -20,18 +20,8 @@ T = np.arange(0.0, 30.0, 0.01)
 Drive = Callable[[int], tuple[np.ndarray, np.ndarray]]
 
 
-@dataclass(frozen=True)
-class Car:
-    """A single-track car whose tyres saturate, SI."""
-
-    mass: float
-    inertia: float
-    a: float
-    b: float
-    front: float
-    rear: float
-    friction: float
-    ratio: float
+Car = namedtuple("Car", "mass inertia a b front rear friction ratio")
+"""A single-track car whose tyres saturate, SI."""
 
 
 SALOON = Car(1600.0, 2400.0, 1.2, 1.5, 90e3, 110e3, 1e3, 16.0)  # its tyres are linear
