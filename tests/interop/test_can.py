@@ -75,7 +75,6 @@ def run(dbc, fmus, tmp_path_factory):
 
 
 def test_every_message_of_a_run_is_what_the_network_carries(dbc, run):
-    results = run
     database = cantools.database.load_file(dbc)
     names = {"wheel_speed": ("plant.wheel_speed_fl", "sensor.wheel_speed_fl")}
     saturated = 0
@@ -85,7 +84,7 @@ def test_every_message_of_a_run_is_what_the_network_carries(dbc, run):
         about = message.get_signal_by_name(signal)
         true, measured = names.get(channel, (f"plant.{channel}", f"sensor.{channel}"))
         every = round(message.cycle_time / 1000 / 0.0025)
-        truth, seen = results[true][::every], results[measured][::every]
+        truth, seen = run[true][::every], run[measured][::every]
         assert np.ptp(truth) > 5 * about.scale * SI[about.unit]
         for value, sent in zip(truth / SI[about.unit], seen / SI[about.unit], strict=True):
             if about.minimum is not None:
@@ -95,8 +94,8 @@ def test_every_message_of_a_run_is_what_the_network_carries(dbc, run):
             data = message.encode({**others, signal: value}, strict=False)
             decoded = message.decode(data)[signal]
             assert sent == pytest.approx(decoded, abs=1e-9)
-        whole = results[measured].size // every * every
-        held = results[measured][:whole].reshape(-1, every)
+        whole = run[measured].size // every * every
+        held = run[measured][:whole].reshape(-1, every)
         assert (held == held[:, :1]).all()
     assert saturated > 10
 

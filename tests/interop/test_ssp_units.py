@@ -49,18 +49,10 @@ def component(name: str, *connectors: str, more: str = "") -> str:
 
 
 def archive(
-    folder: Path,
-    elements: str,
-    connections: str,
-    *,
-    connectors: str = "",
-    bindings: str = "",
-    dictionaries: str = "",
+    folder: Path, elements: str, connections: str, *, bindings: str = "", dictionaries: str = "", **more: str
 ) -> Path:
     """Write an archive of the FMUs a, which gives y, and b, which takes x."""
-    text = description(
-        bindings, elements=elements, connections=connections, connectors=connectors, more=UNITS
-    )
+    text = description(bindings, elements=elements, connections=connections, more=UNITS, **more)
     return pack(folder, text.replace("</ssd:System><ssd:Units>", f"{dictionaries}</ssd:System><ssd:Units>"))
 
 

@@ -63,12 +63,7 @@ def wire(start: str, end: str, inner: str = "", **attributes: str) -> str:
 
 
 def description(
-    bindings: str,
-    *,
-    elements: str = "",
-    connections: str = "",
-    connectors: str = "",
-    more: str = "",
+    bindings: str, *, elements: str = "", connections: str = "", connectors: str = "", more: str = ""
 ) -> str:
     return (
         f'<ssd:SystemStructureDescription {SPACES} version="2.0" name="s"><ssd:System name="r">'

@@ -116,29 +116,22 @@ def spiked(signals: dict[str, np.ndarray]) -> None:
     signals["yaw_rate"][[300, 900, 1700]] += 2.0
 
 
-def scaled(name: str, factor: float):
+def altered(name: str, factor: float = 1.0, *, by: float = 0.0):
     def spoil(signals: dict[str, np.ndarray]) -> None:
-        signals[name] *= factor
-
-    return spoil
-
-
-def shifted(name: str, by: float):
-    def spoil(signals: dict[str, np.ndarray]) -> None:
-        signals[name] += by
+        signals[name] = factor * signals[name] + by
 
     return spoil
 
 
 FLAWS = {
-    "sign": (scaled("acceleration_y", -1.0), "sign", "acceleration_y", -1.0, 0.0),
-    "57.3": (scaled("yaw_rate", np.pi / 180.0), "factor", "yaw_rate", np.pi / 180.0, 1e-9),
-    "9.81": (scaled("acceleration_y", 1.0 / 9.80665), "factor", "acceleration_y", 1.0 / 9.80665, 1e-9),
-    "3.6": (scaled("velocity_x", 1.0 / 3.6), "factor", "velocity_x", 1.0 / 3.6, 1e-9),
+    "sign": (altered("acceleration_y", -1.0), "sign", "acceleration_y", -1.0, 0.0),
+    "57.3": (altered("yaw_rate", np.pi / 180.0), "factor", "yaw_rate", np.pi / 180.0, 1e-9),
+    "9.81": (altered("acceleration_y", 1.0 / 9.80665), "factor", "acceleration_y", 1.0 / 9.80665, 1e-9),
+    "3.6": (altered("velocity_x", 1.0 / 3.6), "factor", "velocity_x", 1.0 / 3.6, 1e-9),
     "lag": (late("acceleration_y"), "lag", "acceleration_y", 0.02, 0.001),
     "lag of the gyro": (late("yaw_rate"), "lag", "yaw_rate", 0.02, 0.002),
-    "sign of v_y": (scaled("velocity_y", -1.0), "sign", "velocity_y", -1.0, 0.0),
-    "offset": (shifted("acceleration_y", 0.4), "zero", "acceleration_y", 0.4, 0.02),
+    "sign of v_y": (altered("velocity_y", -1.0), "sign", "velocity_y", -1.0, 0.0),
+    "offset": (altered("acceleration_y", by=0.4), "zero", "acceleration_y", 0.4, 0.02),
     "spikes": (spiked, "spikes", "yaw_rate", 3, 0),
     "place": (elsewhere, "position", "acceleration_y", 0.8, 0.1),
 }
@@ -214,7 +207,7 @@ def test_gaps_hide_no_flaw_and_make_none(gaps, jitter, tmp_path):
 @pytest.mark.parametrize("reversed_", ["yaw_rate", "acceleration_y"])
 @pytest.mark.parametrize("jitter", [None, *JITTERS])
 def test_without_a_steering_signal_both_of_two_opposed_signals_are_named(reversed_, jitter, tmp_path):
-    whole = spoilt(recording(0), scaled(reversed_, -1.0))
+    whole = spoilt(recording(0), altered(reversed_, -1.0))
     del whole["velocity_y"]
     alone = {name: x for name, x in whole.items() if name != "steering_wheel_angle"}
     still = whole | {"steering_wheel_angle": np.zeros(T.size)}  # decides nothing either
@@ -285,7 +278,7 @@ VEHICLE = "vehicle: {mass: 1600 kg, cg_to_front_axle: 1.2 m, cg_to_rear_axle: 1.
 
 @pytest.mark.parametrize(("factor", "friction_seen"), [(0.2, False), (1.2, True)])
 def test_a_gentle_drive_shows_stiffnesses_and_no_friction(factor, friction_seen, tmp_path):
-    less = spoilt(spoilt(recording(0), scaled("steering_wheel_angle", factor)), scaled(SIDE, factor))
+    less = spoilt(spoilt(recording(0), altered("steering_wheel_angle", factor)), altered(SIDE, factor))
     path = write(tmp_path, less)
     path.write_text(path.read_text() + VEHICLE)
     seen = {effect.parameter: effect.seen for effect in effects_in(load_measurement(path))}
