@@ -25,6 +25,7 @@ UNITS = (
     "allocator_load_proportional", "wheel_control_direct", "tyre_dugoff",
 )  # fmt: skip
 SCENARIO = Path(__file__).parents[2] / "scenarios" / "fnn_sideslip" / "25mps.yaml"
+STOP = 1.6  # s: the car moves
 SAME = 1e-12  # of a signal's range: the container counts time by adding steps
 ONE_STEP = [f"{unit}.step_size=0.001" for unit in ("controller", "allocator", "wheel_control")]
 
@@ -33,21 +34,17 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="its units are t
 
 
 @pytest.fixture(scope="module")
-def both(tmp_path_factory):
+def both(fmus, tmp_path_factory):
     """The FMU of a scenario, and what the scenario gives with `jacobi` and one step: names, values."""
-    from tests.conftest import put_fmus
-
     folder = tmp_path_factory.mktemp("one")
-    put_fmus(folder, components=UNITS)
     file, settings = folder / "car.fmu", [f"--set={one}" for one in ONE_STEP]
-    settings += ["--set", "stop_time=2.5"]
-    assert status_of("export-fmu", SCENARIO, "--fmus", folder, *settings, "--out", file) == 0
-    scenario = load_scenario(SCENARIO, changes=changed(settings=ONE_STEP, stop_time=2.5))
-    plan = make_plan(scenario, fmus=folder)
+    options = ("--set", f"stop_time={STOP}", "--out", file)
+    assert status_of("export-fmu", SCENARIO, "--fmus", fmus, *settings, *options) == 0
+    changes = changed(settings=ONE_STEP, stop_time=STOP)
+    plan = make_plan(load_scenario(SCENARIO, changes=changes), fmus=fmus)
     write_ssp(plan, folder / "car.ssp")
-    request = Request(
-        str(folder / "car.ssp"), float(plan.step), plan.n_steps, [tuple(n) for n in plan.record]
-    )
+    columns = [tuple(name) for name in plan.record]
+    request = Request(str(folder / "car.ssp"), float(plan.step), plan.n_steps, columns)
     return file, request.names, run_own(request).values
 
 
@@ -58,10 +55,9 @@ def largest(theirs, ours):
     return np.max(np.abs(theirs - ours).max(axis=0)[moving] / ranges[moving]), moving.sum()
 
 
-def by_fmpy(file, names, **options):
-    rows = simulate_fmu(
-        str(file), stop_time=2.5, step_size=1e-3, output_interval=1e-3, output=names, **options
-    )
+def by_fmpy(file, names, **start_values):
+    options = {"stop_time": STOP, "step_size": 1e-3, "output_interval": 1e-3, "start_values": start_values}
+    rows = simulate_fmu(str(file), output=names, **options)
     return np.array([rows[name] for name in names]).T
 
 
@@ -76,45 +72,41 @@ def test_one_fmu_is_valid_and_gives_what_its_scenario_gives(both):
 def test_its_parameters_are_those_of_its_units(both):
     file, names, ours = both
     yaw_rate = names.index("plant.yaw_rate")
-    small = by_fmpy(file, names, start_values={"driver.amplitude": 0.01})
+    small = by_fmpy(file, names, **{"driver.amplitude": 0.01})
     assert np.abs(small[:, yaw_rate]).max() < 0.7 * np.abs(ours[:, yaw_rate]).max()
 
 
-def test_it_runs_here_although_it_logs_an_error_and_returns_ok(both, tmp_path, capsys):
+def test_it_runs_here_although_it_logs_an_error_and_returns_ok(both, tmp_path, yawbench):
     file, names, ours = both
     scenario = tmp_path / "one.yaml"
     units = {"car": {"fmu": str(file)}}
-    data = {"stop_time": 2.5, "step_size": 0.001, "units": units, "record": [f"car.{n}" for n in names]}
+    data = {"stop_time": STOP, "step_size": 0.001, "units": units, "record": [f"car.{n}" for n in names]}
     scenario.write_text(json.dumps(data), encoding="utf-8")
-    status = status_of("run", scenario, "--out", tmp_path / "out")
-    said = capsys.readouterr().err
+    status, _, said = yawbench("run", scenario, "--out", tmp_path / "out")
     assert status == 0, said
     assert mentions(said, "warning", "car at t = 0 s", "Error")
     results = load_results(tmp_path / "out")
     assert largest(np.array([results[f"car.{n}"] for n in names]).T, ours)[0] < SAME
 
 
+WIRE = {"from": "driver.steer_angle", "to": "plant.steer_angle"}
+
+
 @pytest.mark.parametrize(
-    ("change", "names"),
+    ("connections", "inputs", "names"),
     [
-        ({"connections": [{"from": "driver.steer_angle", "to": "plant.steer_angle", "gain": 2}]},
-         ("gain", "driver.steer_angle to plant.steer_angle")),
-        ({"connections": [{"from": "driver.steer_angle", "to": "plant.steer_angle", "delay": "1 step"}]},
-         ("delay", "plant.steer_angle")),
-        ({"inputs": {"plant.slope": {"file": "slope.csv"}}}, ("time series", "plant.slope")),
+        ([{**WIRE, "gain": 2}], {}, ("gain", "driver.steer_angle to plant.steer_angle")),
+        ([{**WIRE, "delay": "1 step"}], {}, ("delay", "plant.steer_angle")),
+        ([], {"plant.slope": {"file": "slope.csv"}}, ("time series", "plant.slope")),
     ],
-)  # fmt: skip
-def test_what_a_container_lacks_is_refused(fmus, tmp_path, capsys, change, names):
+)
+def test_what_a_container_lacks_is_refused(fmus, tmp_path, yawbench, connections, inputs, names):
     (tmp_path / "slope.csv").write_text("time,slope\n0,0\n10,0.1\n", encoding="utf-8")
     before = load_scenario(SCENARIO).as_run()
-    data = {
-        key: before[key] for key in ("units", "inputs", "connections", "friction", "speed") if key in before
-    }
+    data = {key: before[key] for key in ("units", "friction", "speed")}
     data |= {"stop_time": 1, "step_size": 0.001, "vehicle": str(SCENARIO.parent / before["vehicle"])}
-    data["connections"] = [*data.get("connections", []), *change.get("connections", [])]
-    data["inputs"] = {**data.get("inputs", {}), **change.get("inputs", {})}
-    path = tmp_path / "s.yaml"
-    path.write_text(json.dumps(data, default=str), encoding="utf-8")
-    assert status_of("export-fmu", path, "--fmus", fmus, "--out", tmp_path / "s.fmu") == 2
-    assert mentions(capsys.readouterr().err, "s.fmu", *names)
+    data |= {"connections": [*before["connections"], *connections], "inputs": inputs}
+    (tmp_path / "s.yaml").write_text(json.dumps(data, default=str), encoding="utf-8")
+    status, _, said = yawbench("export-fmu", tmp_path / "s.yaml", "--fmus", fmus, "--out", tmp_path / "s.fmu")
+    assert status == 2 and mentions(said, "s.fmu", *names)
     assert not (tmp_path / "s.fmu").exists()

@@ -3,14 +3,22 @@
 from __future__ import annotations
 
 import math
-import zipfile
 from pathlib import Path
 
 import pytest
 
-from tests.changed import changed
 from tests.fmus.fake_fmus import Var, make_fmu, out
-from tests.refusals import each_mentions, mentions, refused, texts_of
+from tests.interop.test_ssp_values import (
+    description,
+    inline,
+    pack,
+    parameter,
+    parameters,
+    plan_of,
+    problem,
+    wire,
+)
+from tests.refusals import each_mentions, mentions, refused
 from yawbench.foundation.errors import YawbenchError
 from yawbench.interop.ssp_write import for_omsimulator, system_structure, write_ssp
 from yawbench.orchestrator.plan import Plan, Wire
@@ -40,33 +48,12 @@ def component(name: str, *connectors: str, more: str = "") -> str:
     )
 
 
-def wire(start: str, end: str, inner: str = "", **attributes: str) -> str:
-    ends = zip(("start", "end"), (start, end), strict=True)
-    named = [
-        f'{which}Element="{e}" {which}Connector="{c}"'
-        for which, one in ends
-        for e, _, c in [one.partition(".")]
-    ]
-    more = " ".join(f'{key}="{value}"' for key, value in attributes.items())
-    return f"<ssd:Connection {' '.join(named)} {more}>{inner}</ssd:Connection>"
-
-
 def archive(
-    folder: Path, elements: str, connections: str, *, connectors: str = "", bindings: str = ""
+    folder: Path, elements: str, connections: str, *, bindings: str = "", dictionaries: str = "", **more: str
 ) -> Path:
     """Write an archive of the FMUs a, which gives y, and b, which takes x."""
-    text = (
-        f'<ssd:SystemStructureDescription xmlns:ssd="{SSD}" xmlns:ssc="{SSC}" xmlns:ssv="{SSV}" '
-        f'version="1.0" name="s"><ssd:System name="r"><ssd:Connectors>{connectors}</ssd:Connectors>'
-        f"{bindings}<ssd:Elements>{elements}</ssd:Elements><ssd:Connections>{connections}</ssd:Connections>"
-        f'</ssd:System>{UNITS}<ssd:DefaultExperiment stopTime="1"/></ssd:SystemStructureDescription>'
-    )
-    path = folder / "s.ssp"
-    with zipfile.ZipFile(path, "w") as held:
-        held.writestr("SystemStructure.ssd", text)
-        for fmu in folder.glob("*.fmu"):
-            held.write(fmu, f"resources/{fmu.name}")
-    return path
+    text = description(bindings, elements=elements, connections=connections, more=UNITS, **more)
+    return pack(folder, text.replace("</ssd:System><ssd:Units>", f"{dictionaries}</ssd:System><ssd:Units>"))
 
 
 def fmus(folder: Path, of: str | None, to: str | None, kind: str = "Real") -> None:
@@ -76,22 +63,11 @@ def fmus(folder: Path, of: str | None, to: str | None, kind: str = "Real") -> No
     make_fmu(folder / "b.fmu", inputs=[Var("x", to, start=start, **change)], outputs=["z"])
 
 
-def plan_of(path: Path) -> Plan:
-    return make_plan(load_scenario(path, changes=changed(step_size=0.1)))
-
-
 def scale(path: Path) -> tuple[float, float]:
     """Return gain and offset of the only wire."""
     (only,) = plan_of(path).wires
     assert (only.source, only.output, only.target, only.input) == ("a", "y", "b", "x")
     return pytest.approx(only.gain, rel=1e-12), pytest.approx(only.offset, rel=1e-12)  # type: ignore[return-value]
-
-
-def problem(path: Path) -> str:
-    with pytest.raises(YawbenchError) as caught:
-        plan_of(path)
-    (sentence,) = texts_of(caught.value)
-    return sentence
 
 
 @pytest.mark.parametrize(
@@ -149,7 +125,7 @@ def test_a_signal_dictionary_passes_its_source_on_to_all_that_refer_to_it(unit, 
     elements = (
         component("a", connector("y", "output")) + reference("here", connector("angle", "inout")) + inner
     )
-    path = archive(tmp_path, elements, wire("a.y", "here.angle"), bindings=dictionary(unit))
+    path = archive(tmp_path, elements, wire("a.y", "here.angle"), dictionaries=dictionary(unit))
     (only,) = plan_of(path).wires
     assert (only.source, only.output, only.target, only.input) == ("a", "y", "inner_b", "x")
     assert (only.gain, only.offset) == (pytest.approx(gain, rel=1e-12), 0.0)
@@ -170,7 +146,7 @@ def test_a_signal_dictionary_that_cannot_be_is_refused(connections, given, names
     text = (
         component("a", connector("y", "output")) + component("b", connector("x", "input")) + reference("bus")
     )
-    assert mentions(problem(archive(tmp_path, text, connections, bindings=given)), *names)
+    assert mentions(problem(archive(tmp_path, text, connections, dictionaries=given)), *names)
 
 
 ENDS = component("a", connector("y", "output", "deg")) + component("b", connector("x", "input", "rad"))
@@ -212,30 +188,24 @@ def test_an_empty_element_is_the_system_itself_and_its_connectors_convert_too(tm
     assert (only.gain, only.offset) == (pytest.approx(10 * 2 * math.pi), 0.5)
 
 
-def test_a_value_at_a_systems_connector_is_converted_on_its_way(tmp_path):
-    fmus(tmp_path, None, None)
-    bindings = (
-        "<ssd:ParameterBindings><ssd:ParameterBinding><ssd:ParameterValues>"
-        '<ssv:ParameterSet version="1.0" name="v"><ssv:Parameters><ssv:Parameter name="u">'
-        '<ssv:Real value="0.25" unit="turn"/></ssv:Parameter></ssv:Parameters><ssv:Units>'
-        '<ssc:Unit name="turn"><ssc:BaseUnit rad="1" factor="6.283185307179586"/></ssc:Unit></ssv:Units>'
-        "</ssv:ParameterSet></ssd:ParameterValues></ssd:ParameterBinding></ssd:ParameterBindings>"
-    )
+def test_a_value_at_a_systems_connector_is_converted_on_its_way_to_all_inputs_behind_it(tmp_path):
+    make_fmu(tmp_path / "b.fmu", inputs=[Var("x", None), Var("w", None)], outputs=["z"])
+    definition = '<ssc:Unit name="turn"><ssc:BaseUnit rad="1" factor="6.283185307179586"/></ssc:Unit>'
+    given = parameters(parameter("u", '<ssv:Real value="0.25" unit="turn"/>'), more=definition)
     path = archive(
         tmp_path,
-        component("b", connector("x", "input", "rad")),
-        wire(".u", "b.x", LINEAR),
+        component("b", connector("x", "input", "rad"), connector("w", "input", "deg")),
+        wire(".u", "b.x", LINEAR) + wire(".u", "b.w"),
         connectors=connector("u", "input", "deg"),
-        bindings=bindings,
+        bindings=inline(given),
     )
     (b,) = plan_of(path).instances
-    assert b.constants == {"x": pytest.approx(10 * math.pi / 2 + 0.5)}
+    assert b.constants == {"x": pytest.approx(10 * math.pi / 2 + 0.5), "w": pytest.approx(90.0)}
 
 
 @pytest.mark.parametrize(
     ("kind", "inner", "names"),
     [
-        ("Integer", '<ssc:LinearTransformation factor="2" offset="-1"/>', None),
         ("Integer", LINEAR, ("gain", "offset", "Integer")),
         ("Boolean", '<ssc:LinearTransformation factor="2"/>', ("gain", "Boolean")),
         ("Boolean", "<ssc:BooleanMappingTransformation/>", ("BooleanMappingTransformation",)),
@@ -244,15 +214,18 @@ def test_a_value_at_a_systems_connector_is_converted_on_its_way(tmp_path):
     ],
 )
 def test_what_cannot_be_done_to_a_type_is_refused_in_one_sentence(kind, inner, names, tmp_path):
-    fmus(tmp_path, None, None, kind)
-    elements = component("a", connector("y", "output", of=kind)) + component(
-        "b", connector("x", "input", of=kind)
-    )
-    path = archive(tmp_path, elements, wire("a.y", "b.x", inner))
-    if names is None:
-        assert scale(path) == (2.0, -1.0)
-    else:
-        assert mentions(problem(path), *names)
+    assert mentions(problem(of_type(tmp_path, kind, inner)), *names)
+
+
+def test_integers_have_whole_gains_and_offsets(tmp_path):
+    whole = '<ssc:LinearTransformation factor="2" offset="-1"/>'
+    assert scale(of_type(tmp_path, "Integer", whole)) == (2.0, -1.0)
+
+
+def of_type(folder: Path, kind: str, inner: str) -> Path:
+    fmus(folder, None, None, kind)
+    a, b = connector("y", "output", of=kind), connector("x", "input", of=kind)
+    return archive(folder, component("a", a) + component("b", b), wire("a.y", "b.x", inner))
 
 
 # What is written

@@ -14,9 +14,10 @@ from lxml import html
 import yawbench as yb
 from tests.command_line import status_of
 from tests.commands.test_output import ALWAYS, documented
+from tests.measured_cars.samples import Samples
 from tests.reports.browser import DESK, PHONE, Browser
 from tests.reports.flaws import check_whole, looks
-from tests.reports.made_up import data_in, unpacked
+from tests.reports.made_up import unpacked
 from yawbench.figures.display import shown
 from yawbench.foundation.errors import ScenarioError
 from yawbench.measured_cars.fit_file import load_fit
@@ -134,93 +135,83 @@ def test_an_interrupted_fit_goes_on(folder, monkeypatch):
         return original(jobs, **options)
 
     monkeypatch.setattr(module, "execute", stops)
-    command = ("fit", folder / "fit.yaml", "--out", folder / "again", "--jobs", "1")
+    out = folder / "again"
+    command = ("fit", one_parameter(folder, INERTIA, 60), "--out", out, "--jobs", "1")
     assert status_of(*command) == 130
     before = sum(made[:3])
-    assert len(list((folder / "again" / "sets").iterdir())) == before
+    assert len(list((out / "sets").iterdir())) == before
     made.clear()
     made.extend([0] * 4)  # no further interruption
     assert status_of(*command) == 0
-    total = json.loads((folder / "again" / "fit.json").read_text())["models"]["7 DOF"]["sets"]
+    total = json.loads((out / "fit.json").read_text())["models"]["7 DOF"]["sets"]
     assert sum(made) == total - before + 1  # one of the held-out window
 
 
-def test_a_parameter_without_effect_is_refused(folder):
-    without = "  plant.low_speed: {low: 0.1, high: 2, start: 1}\n"
-    (folder / "without.yaml").write_text(FIT.replace("free:\n", f"free:\n{without}"))
-    with pytest.raises(ScenarioError) as refused:
-        yb.fit(folder / "without.yaml", workers=1)
-    assert refused.value.code == "fit-not-identifiable"
-    assert "plant.low_speed" in str(refused.value)
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "code", "line"),
-    [
-        ("compared: {yaw_rate:", "compared: {roll_rate:", "signal-unknown", 6),
-        ("begin: 3 s", "begin: 2 s", "fit-window", 5),
-        ("end: 4 s", "end: 9 s", "fit-window", 5),
-        ("{begin: 0,", "{segment: 2, begin: 0,", "segment-unknown", 4),
-        ("title: A", "titel: A", "key-unknown", 1),
-    ],
-)
-def test_mistakes_of_a_fit_file_have_a_line(folder, old, new, code, line):
+def refused_fit(folder: Path, old: str, new: str) -> ScenarioError:
     path = folder / "wrong.yaml"
     path.write_text(FIT.replace(old, new))
     with pytest.raises(ScenarioError) as refused:
-        load_fit(path)
-    assert (code, line) in {(one.code, one.location.line) for one in refused.value.diagnostics}
+        yb.fit(path, workers=1)
+    return refused.value
+
+
+def test_a_parameter_without_effect_is_refused(folder):
+    refused = refused_fit(folder, "free:\n", "free:\n  plant.low_speed: {low: 0.1, high: 2, start: 1}\n")
+    assert refused.code == "fit-not-identifiable"
+    assert "plant.low_speed" in str(refused)
 
 
 @pytest.mark.parametrize(
-    ("free", "most_sets"),
+    ("old", "new", "code", "lines", "name"),
     [
-        ("vehicle.yaw_inertia: {low: 800, high: 1000, start: 900}", 60),  # the truth lies beyond
-        ("vehicle.yaw_inertia: {low: 800, high: 4000, start: 3999.999}", 2),  # no set but the first
-        ("vehicle.yaw_inertia: {low: 800, high: 4000, start: 2200}", 2),
+        ("compared: {yaw_rate:", "compared: {roll_rate:", "signal-unknown", {6}, "roll_rate"),
+        ("begin: 3 s", "begin: 2 s", "fit-window", {5}, "training"),
+        ("end: 4 s", "end: 9 s", "fit-window", {5}, "9 s"),
+        ("{begin: 0,", "{segment: 2, begin: 0,", "segment-unknown", {4}, "2"),
+        ("title: A", "titel: A", "key-unknown", {1}, "titel"),
+        ("settling: 0.2 s", "settling: 3 s", "fit-window", {4, 5}, "settling"),
+        ("settling: 0.2 s", "settling: 2.9999 s", "fit-window", {4, 5}, "settling"),
+        ("yaw_rate: 0.1 deg/s", "yaw_rate: 1e-290", "fit-window", {4, 5}, "yaw_rate"),  # too large then
+    ],
+)
+def test_mistakes_of_a_fit_file_have_a_line(folder, old, new, code, lines, name):
+    refused = refused_fit(folder, old, new)
+    assert {(one.code, one.location.line) for one in refused.diagnostics} >= {(code, k) for k in lines}
+    assert name in str(refused)
+
+
+INERTIA = "{low: 800, high: 4000, start: 2200}"
+
+
+def one_parameter(folder: Path, inertia: str, most_sets: int) -> Path:
+    """Write a fit of a car's inertia alone."""
+    file = folder / "one.yaml"
+    free = f"most_sets: {most_sets}\nfree:\n  vehicle.yaw_inertia: {inertia}\n"
+    file.write_text(FIT.partition("free:")[0] + free)
+    return file
+
+
+@pytest.mark.parametrize(
+    ("inertia", "most_sets"),
+    [
+        ("{low: 800, high: 1000, start: 900}", 60),  # the truth lies beyond
+        ("{low: 800, high: 4000, start: 3999.999}", 2),  # no set but the first
+        (INERTIA, 2),
     ],
 )
 def test_a_fit_of_one_parameter_that_ends_where_it_began_or_at_a_bound_has_a_result(
-    free, most_sets, folder, tmp_path, capsys
+    inertia, most_sets, folder, tmp_path, yawbench
 ):
-    head = FIT.partition("free:")[0]
-    file = folder / "one.yaml"
-    file.write_text(f"{head}most_sets: {most_sets}\nfree:\n  {free}\n")
-    assert status_of("fit", file, "--out", tmp_path / "out", "--jobs", "1") == 0, capsys.readouterr().err
-    data = json.loads((tmp_path / "out" / "fit.json").read_text())
-    own, _ = data["models"].values()
+    file = one_parameter(folder, inertia, most_sets)
+    status, _, said = yawbench("fit", file, "--out", tmp_path, "--jobs", "1")
+    assert status == 0, said
+    own, _ = json.loads((tmp_path / "fit.json").read_text())["models"].values()
     (parameter,) = own["parameters"].values()
     assert 800 <= parameter["value"] <= 4000
-    assert (tmp_path / "out" / "fit.html").is_file()
-
-
-@pytest.mark.parametrize("settling", ["3 s", "2.9999 s", "1000 s"])
-def test_a_window_of_which_nothing_is_compared_is_refused_at_its_line(settling, folder, tmp_path):
-    file = folder / "settling.yaml"
-    file.write_text(FIT.replace("settling: 0.2 s", f"settling: {settling}"))
-    with pytest.raises(ScenarioError) as caught:
-        load_fit(file)
-    assert {one.code for one in caught.value.diagnostics} == {"fit-window"}
-    lines = file.read_text().splitlines()
-    assert all(
-        lines[one.location.line - 1].startswith(("training", "held_out")) for one in caught.value.diagnostics
-    )
-    assert "settling" in str(caught.value)
-
-
-def test_values_too_large_to_be_compared_are_refused(folder):
-    file = folder / "large.yaml"
-    file.write_text(FIT.replace("yaw_rate: 0.1 deg/s", "yaw_rate: 1e-290"))
-    with pytest.raises(ScenarioError) as caught:
-        load_fit(file)
-    assert {one.code for one in caught.value.diagnostics} == {"fit-window"}
-    assert "yaw_rate" in str(caught.value)
+    assert (tmp_path / "fit.html").is_file()
 
 
 # Its page
-
-
-VIEWER = "const viewer = document.querySelector('.yv').viewer;"
 
 
 def test_every_number_of_its_tables_is_that_of_the_file(page):
@@ -246,31 +237,16 @@ def test_every_number_of_its_tables_is_that_of_the_file(page):
     assert said[:1].lower() + said[1:].rstrip(".") == data["verdict"]
 
 
-def test_decoded_samples_equal_the_measured_ones(chromium: Browser, folder, page):
-    fit = load_fit(folder / "fit.yaml")
-    chromium.open(page)
-    chromium.wait_for("document.querySelector('.yv-ready')")
-    windows = [each.window for each in (*fit.training, *fit.held_out)]
-    rng = np.random.default_rng(3)
-    for _ in range(20):
-        window = windows[int(rng.integers(len(windows)))]
-        name = ("yaw_rate", "acceleration_y")[int(rng.integers(2))]
-        row = int(rng.integers(1, window.times.size - 1))
-        value, spread = chromium.run(
-            VIEWER + "const column = (run) => run.column(`plant.${arguments[0]}`);"
-            "const all = viewer.runs.flatMap((run) => [...column(run)]);"
-            "return [viewer.runs[0].at(`plant.${arguments[0]}`, arguments[1]),"
-            " Math.max(...all) - Math.min(...all)];",
-            name,
-            float(window.times[row]),
-        )
-        assert abs(value - window.measured[name][row]) <= spread / 131068 * (1 + 1e-9)
-
-
-def test_its_views_are_histories_and_cross_plots_of_the_car_and_both_models(page):
-    data = data_in(page.read_text(encoding="utf-8"))
-    assert [view["x"] for view in data["views"]] == ["time", "plant.acceleration_y"]
-    assert data["runs"][0]["label"] == "made up" and len(data["runs"]) == 3
+def test_its_samples_are_the_measured_ones_and_its_views_histories_and_cross_plots_of_all_three(folder, page):
+    samples, fit = Samples(page), load_fit(folder / "fit.yaml")
+    assert [view["x"] for view in samples.data["views"]] == ["time", "plant.acceleration_y"]
+    assert samples.data["runs"][0]["label"] == "made up" and len(samples.data["runs"]) == 3
+    times, _ = samples.of(0, "time")
+    for window in (each.window for each in (*fit.training, *fit.held_out)):
+        for name in ("yaw_rate", "acceleration_y"):
+            values, step = samples.of(0, f"plant.{name}")
+            found = np.interp(window.times[1:-1], times, values)
+            assert np.abs(found - window.measured[name][1:-1]).max() <= step
 
 
 @pytest.mark.parametrize(("width", "colours"), looks(PHONE, DESK, narrow=False))

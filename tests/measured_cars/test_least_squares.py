@@ -101,9 +101,15 @@ def offset(name: str, most: float = 0.1) -> Parameter:
 
 
 def residuals_of(
-    windows: Sequence[SingleTrackWindow], parameters: Sequence[Parameter], settling: float = 0.0
+    windows: Sequence[SingleTrackWindow],
+    parameters: Sequence[Parameter],
+    errors: Mapping[str, float] = ERRORS,
+    *,
+    settling: float = 0.0,
+    **fixed: float,
 ) -> Residuals:
-    return Residuals(Car(windows), [one.window for one in windows], parameters, ERRORS, settling=settling)
+    of_car = [one.window for one in windows]
+    return Residuals(Car(windows, fixed), of_car, parameters, errors, settling=settling)
 
 
 def sweep(times: np.ndarray) -> np.ndarray:
@@ -143,7 +149,7 @@ MANOEUVRES: dict[str, Any] = {
 }
 
 
-@pytest.mark.sampled(1)
+@pytest.mark.exhaustive
 @pytest.mark.parametrize(
     ("manoeuvre", "names", "noise", "free_ratio", "within"),
     [
@@ -159,14 +165,7 @@ def test_parameters_are_found_from_noisy_manoeuvres(manoeuvre, names, noise, fre
     monkeypatch.setitem(globals(), "RATE", 100.0)
     windows = with_noise(MANOEUVRES[manoeuvre](), noise, 0)
     ratio = [Parameter("steering_ratio", 1.1 * RATIO, 10.0, 25.0)] if free_ratio else []
-    residuals = Residuals(
-        Car(windows),
-        [one.window for one in windows],
-        [*off(*names), *ratio],
-        noise,
-        settling=0.0,
-    )
-    found = estimate(residuals, most_sets=100)
+    found = estimate(residuals_of(windows, [*off(*names), *ratio], noise), most_sets=100)
     for name, value in found.values.items():
         assert value == pytest.approx((TRUTH | {"steering_ratio": RATIO})[name], rel=within)
 
@@ -216,12 +215,9 @@ def test_zero_points_are_refused_at_one_speed_and_accepted_at_two(speeds, refuse
     names = ("steer_angle.offset", "measured.yaw_rate.offset", "measured.acceleration_y.offset")
     parameters = [*off(*LINEAR), *map(offset, names)]
     windows = measured(sweep, speeds, LONG, **LINEAR_TYRES)
-    residuals = Residuals(
-        Car(windows, LINEAR_TYRES), [one.window for one in windows], parameters, ERRORS, settling=3.0
-    )
-    found = identifiability(
-        residuals.jacobian(np.array([one.start for one in parameters])), [one.name for one in parameters]
-    )
+    residuals = residuals_of(windows, parameters, settling=3.0, **LINEAR_TYRES)
+    jacobian = residuals.jacobian(np.array([one.start for one in parameters]))
+    found = identifiability(jacobian, [one.name for one in parameters])
     assert found.refused == refused
     assert set(found.weakest) == set(names)
     assert refused or found.condition < 20
@@ -235,46 +231,27 @@ def test_a_start_that_fails_is_named():
         estimate(residuals, most_sets=80)
 
 
-def coverage(half_widths: Any, trials: int = 100) -> float:
-    """Return how often intervals cover the truth, under noise with a correlation time of 0.5 s.
+def test_intervals_cover_the_truth_under_correlated_noise():
+    """Signals and noise have a correlation time of 0.5 s; 40 s at 50 Hz, two parameters."""
+    from scipy.signal import lfilter  # not at the top: it takes long, and few tests need it
 
-    Signals and noise vary as slowly; 40 s at 100 Hz, two parameters.
-    """
     chance = np.random.default_rng(7)
     decay = np.exp(-1.0 / (RATE * 0.5))
     rows = int(40 * RATE)
 
     def slow(*shape: int) -> np.ndarray:
-        from scipy.signal import lfilter  # not at the top: it takes long, and few tests need it
-
         white = chance.standard_normal((*shape, rows + 500))
         return lfilter([np.sqrt(1 - decay**2)], [1, -decay], white)[..., 500:]
 
     jacobian = slow(2).T
     pieces = (np.arange(rows) / (5 * RATE)).astype(int)
-    hits = 0.0
-    for _ in range(trials):
+    hits = []
+    for _ in range(100):
         noise = 0.05 * slow()  # well below 1, where soft_l1 is quadratic
         errors = np.linalg.lstsq(jacobian, noise, rcond=None)[0]
-        hits += np.mean(np.abs(errors) <= half_widths(noise - jacobian @ errors, jacobian, pieces))
-    return hits / trials
-
-
-def clustered(residuals: np.ndarray, jacobian: np.ndarray, pieces: np.ndarray) -> np.ndarray:
-    return intervals_of(covariance(residuals, jacobian, pieces), int(pieces.max()) + 1)
-
-
-def plain(residuals: np.ndarray, jacobian: np.ndarray, pieces: np.ndarray) -> np.ndarray:
-    variance = residuals @ residuals / (len(residuals) - jacobian.shape[1])
-    return 1.96 * np.sqrt(variance * np.diag(np.linalg.inv(jacobian.T @ jacobian)))
-
-
-def test_intervals_cover_the_truth_under_correlated_noise():
-    assert coverage(clustered) >= 0.85
-
-
-def test_intervals_that_take_samples_for_independent_would_fail_that():
-    assert coverage(plain) < 0.85
+        spread = covariance(noise - jacobian @ errors, jacobian, pieces)
+        hits.append(np.abs(errors) <= intervals_of(spread, int(pieces.max()) + 1))
+    assert np.mean(hits) >= 0.85  # of intervals that take samples for independent, 0.3
 
 
 def test_there_are_no_intervals_from_few_pieces():

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -12,11 +12,11 @@ from lxml import html
 from matplotlib.path import Path as Line
 
 import yawbench as yb
-from tests.command_line import status_of
+from tests.measured_cars.samples import Samples
 from tests.measured_cars.test_validation import line, write, write_study
 from tests.orchestrator.recorded import write as write_run
 from tests.reports.browser import DESK, PHONE, Browser
-from tests.reports.flaws import check_whole, flaws, inaccessible, looks
+from tests.reports.flaws import COLOURS, check_whole, flaws, inaccessible, looks
 from tests.reports.made_up import data_in, unpacked, whole_car
 from yawbench.measured_cars.validation import CrossPlot
 from yawbench.measured_cars.validation_page import validation_page, validation_sentence
@@ -26,53 +26,43 @@ from yawbench.reports.study_page import chapter
 from yawbench.studies.experiment_result import judge_results
 from yawbench.studies.load_experiment import load_experiment
 
-VIEWER = "const viewer = document.querySelector('.yv').viewer;"
-
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory):
+def validation(tmp_path_factory):
     """A run along a = 10 delta, and four noisy tests of a car, the last two to the right."""
     folder = tmp_path_factory.mktemp("validation")
     rng = np.random.default_rng(5)
-    files = []
     for k in range(4):
         a_y = np.linspace(1.0, 5.2, 400) * (1.0 if k < 2 else -1.0)
         hand = 0.1 * a_y + 0.03 * np.sign(a_y) + rng.normal(0.0, 0.002, 400)
-        write(folder, f"test{k}", hand, a_y + rng.normal(0.0, 0.03, 400), tests=1)
-        files.append(f"test{k}_0.csv")
-    described = (folder / "test0.yaml").read_text(encoding="utf-8")
-    measured = folder / "car.yaml"
-    measured.write_text(re.sub("files: .*", f"files: [{', '.join(files)}]", described), "utf-8")
-    run = yb.measured(line(folder, "run"), segment=1)
-    return folder, run, yb.validate(run, measured)
+        path = write(folder, f"test{k}", hand, a_y + rng.normal(0.0, 0.03, 400), tests=1)
+    files = ", ".join(f"test{k}_0.csv" for k in range(4))
+    path.write_text(path.read_text(encoding="utf-8").replace("test3_0.csv", files), "utf-8")
+    return yb.validate(yb.measured(line(folder, "run"), segment=1), path)
 
 
 @pytest.fixture(scope="module")
-def page(made) -> Path:
-    folder, _, validation = made
-    file = folder / "validation.html"
+def page(validation, tmp_path_factory) -> Path:
+    file = tmp_path_factory.mktemp("page") / "validation.html"
     file.write_text(validation_page(validation), "utf-8")
     return file
 
 
-def test_it_has_the_verdict_the_conditions_and_the_source_of_the_bands(made, page):
-    _, _, validation = made
+def test_it_has_the_verdict_the_conditions_and_the_source_of_the_bands(validation, page):
     tree = html.fromstring(unpacked(page))
     (verdict,) = validation.verdicts.values()
     signals, conditions = tree.cssselect("main > table")
-    rows = [row.text_content() for row in signals.cssselect("tbody tr")]
-    assert len(rows) == len(validation.verdicts)
+    (row,) = (row.text_content() for row in signals.cssselect("tbody tr"))
     distance = apart(verdict.value, 1.0, decimals=2)
-    assert distance in rows[0] and verdict.status.value in rows[0]
-    assert len(conditions.cssselect("tbody tr")) == len(validation.conditions) == 2
+    assert distance in row and verdict.status.value in row
+    assert len(validation.conditions) == 2
     assert [row.cssselect(".verdict.good") != [] for row in conditions.cssselect("tbody tr")] == [True, True]
     text = tree.text_content()
     assert validation.source in text and validation.origin in text
     assert f"{distance} of the tolerance" in tree.xpath("string(//p[@class='said'])")
 
 
-def test_a_distance_next_to_the_bound_never_reads_as_the_bound(made):
-    _, _, validation = made
+def test_a_distance_next_to_the_bound_never_reads_as_the_bound(validation):
     (verdict,) = validation.verdicts.values()
     near = replace(validation, verdicts={"steering_wheel_angle": replace(verdict, value=1.00004)})
     assert "1.00004 of" in validation_sentence(near)
@@ -103,9 +93,9 @@ def test_the_band_drawn_is_the_band_judged_with_its_ends(turns):
     assert np.array_equal((inside % 2 == 1)[clear], (far < 1.0)[clear])
 
 
-def test_the_page_carries_run_band_and_tests_to_the_side_of_the_run(made, page):
-    _, _, validation = made
-    data = data_in(page.read_text(encoding="utf-8"))
+def test_the_page_carries_run_band_and_tests_to_the_side_of_the_run(validation, page):
+    samples, (plot,) = Samples(page), validation.plots
+    data = samples.data
     labels = [run["label"] for run in data["runs"]]
     assert [labels[0], labels[-1]] == [validation.title, "tolerance"]
     assert [label.endswith(", mirrored") for label in labels[1:-1]] == [False, False, True, True]
@@ -113,34 +103,17 @@ def test_the_page_carries_run_band_and_tests_to_the_side_of_the_run(made, page):
     assert [view["x"] for view in data["views"]] == ["plant.acceleration_y", "time"]
     assert data["views"][1]["shown"] == [0, 1, 2, 3, 4]
     assert {name for name, *_ in data["limits"]} == {"steering_wheel_angle.distance"}
+    for k, test in enumerate(plot.tests, start=1):
+        for name, wanted in (
+            ("plant.acceleration_y", test.over),
+            ("plant.steering_wheel_angle", test.values),
+            ("steering_wheel_angle.distance", test.distance),
+        ):
+            values, step = samples.of(k, name)
+            assert np.abs(values - wanted).max() <= 0.5 * step * (1 + 1e-9), name
 
 
-def test_decoded_samples_equal_those_of_the_car(chromium: Browser, made, page):
-    _, _, validation = made
-    (plot,) = validation.plots
-    chromium.open(page)
-    chromium.wait_for("document.querySelector('.yv-ready')")
-    rng = np.random.default_rng(3)
-    names = {"plant.acceleration_y": "over", "plant.steering_wheel_angle": "values",
-             "steering_wheel_angle.distance": "distance"}  # fmt: skip
-    spans = chromium.run(
-        VIEWER + "return Object.fromEntries(arguments[0].map((name) => {"
-        " const all = viewer.runs.filter((run) => run.has(name)).flatMap((run) => [...run.column(name)]);"
-        " return [name, Math.max(...all) - Math.min(...all)]; }))",
-        [*names],
-    )
-    for _ in range(20):
-        k, (name, field) = int(rng.integers(4)), [*names.items()][int(rng.integers(3))]
-        row = int(rng.integers(plot.tests[k].over.size))
-        value = chromium.run(
-            VIEWER + "return viewer.runs[arguments[0]].column(arguments[1])[arguments[2]]", k + 1, name, row
-        )
-        wanted = getattr(plot.tests[k], field)[row]
-        assert abs(value - wanted) <= spans[name] / 131068 * (1 + 1e-9), name
-
-
-def test_a_recording_of_another_time_begins_with_the_run_so_that_the_slider_ends_with_the_data(made):
-    _, _, validation = made
+def test_a_recording_of_another_time_begins_with_the_run_so_that_the_slider_ends_with_the_data(validation):
     (plot,) = validation.plots
     late = replace(plot, tests=[plot.tests[0], replace(plot.tests[1], time=plot.tests[1].time + 749.0)])
     data = data_in(validation_page(replace(validation, plots=[late])))
@@ -153,31 +126,33 @@ def test_the_page_has_no_flaws_and_stays_within_its_budget(chromium: Browser, pa
     check_whole(chromium, page, width, colours)
 
 
-def test_validate_writes_the_page_when_asked(made, tmp_path, capsys):
-    folder, run, _ = made
-    results = run.save(tmp_path / "results")
-    call = ("validate", results, "--measured", folder / "car.yaml", "--out", tmp_path / "out")
-    assert status_of(*call) == 0 and not (tmp_path / "out/validation.html").exists()
-    assert status_of(*call, "--page") == 0
-    assert "validation.html" in capsys.readouterr().err
-    assert "tolerance" in (tmp_path / "out/validation.html").read_text(encoding="utf-8")
-
-
-@pytest.mark.parametrize(("width", "colours"), looks(PHONE, DESK, narrow=False))
-def test_a_study_has_a_chapter_on_its_validations(chromium: Browser, tmp_path, width, colours):
-    write_study(tmp_path, more_bands="steer_angle: {offset: 0.5 deg, gain: 0}, ")
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    """The findings of a study with two validations, and its page."""
+    folder = tmp_path_factory.mktemp("study")
+    write_study(folder, steer_angle="0.5 deg")
     run = whole_car()
     wheel = "driver.steering_wheel_angle"
     run.columns[wheel], run.units[wheel] = 15.0 * run.columns["driver.steer_angle"], "rad"
-    write_run(run, tmp_path / "ramp")
-    findings = judge_results(load_experiment(tmp_path / "study.yaml"), tmp_path)
-    page = tmp_path / "report.html"
-    page.write_text(render(chapter(findings, command="yawbench study", stale={}, folder=tmp_path)), "utf-8")
+    write_run(run, folder / "ramp")
+    findings = judge_results(load_experiment(folder / "study.yaml"), folder)
+    page = folder / "report.html"
+    page.write_text(render(chapter(findings, command="yawbench study", stale={}, folder=folder)), "utf-8")
+    return findings, page
+
+
+def test_a_study_has_a_chapter_on_its_validations(study):
+    findings, page = study
     tree = html.fromstring(unpacked(page))
-    assert len(tree.cssselect("#validations ~ h3")) == len(findings.sections["validations"]) == 2
     near, far = findings.sections["validations"]
+    assert len(tree.cssselect("#validations ~ h3")) == 2
     assert "2 tests of the car" in tree.text_content()
     assert {near.source, far.source} == {"chosen", near.source}
-    chromium.open(page, width=width)
+
+
+@pytest.mark.exhaustive
+@pytest.mark.parametrize(("width", "colours"), [*product((PHONE, DESK), COLOURS)])
+def test_the_page_of_a_study_with_validations_has_no_flaws(chromium: Browser, study, width, colours):
+    chromium.open(study[1], width=width)
     assert flaws(chromium) == []
     assert inaccessible(chromium, colours) == []

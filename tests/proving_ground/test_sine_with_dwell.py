@@ -14,7 +14,7 @@ from tests.command_line import status_of
 from tests.refusals import mentions
 from yawbench.components.drivers.sine_with_dwell import SineWithDwellParameters, sine_with_dwell
 from yawbench.measurements.measured_results import load_run
-from yawbench.metrics.verdict import NotJudged, Status, Verdict, apart, not_judged
+from yawbench.metrics.verdict import NotJudged, Status, Verdict, apart
 from yawbench.proving_ground.sine_with_dwell import amplitudes, evaluate_dwell, is_series, judge_series
 from yawbench.proving_ground.standard_tests import Evaluation
 from yawbench.proving_ground.steering_tests import G, characteristic_angle, evaluate_slow_steer
@@ -101,31 +101,18 @@ def test_instants_ratios_and_displacement_are_those_of_the_closed_forms(sampling
 
 
 @pytest.mark.parametrize(
-    "width, verdict",
+    "width, verdict, says",
     # 1 / cosh(x) is 35 % at x = 1.708, and COS + 1 s is 1.743 s after the peak: x = 1.708 at 1.020
-    [(1.015, "passed"), (1.025, "failed")],
+    [(1.015, "passed", "34.8 %"), (1.019246, "failed", "35.01 %"), (1.025, "failed", "35.3 %")],
 )
-def test_the_limit_of_35_per_cent_decides(width, verdict):
+def test_the_limit_of_35_per_cent_decides_and_no_ratio_reads_like_it(width, verdict, says):
     def yaw_rate(t):
         return fall(t, width) * 0.5 * (1.0 - np.tanh((t - END - 1.4) / 0.1))  # good at 1.75 s
 
     judged = evaluate_dwell(trace(yaw_rate=yaw_rate), A)
     assert judged.criteria["stability"].status.value == verdict
     assert (judged["ratio_1000"] > 0.35) == (verdict == "failed")
-
-
-def test_a_ratio_that_misses_its_limit_by_little_reads_differently_from_it():
-    low, high = 1.015, 1.025
-    for _ in range(30):
-        width = 0.5 * (low + high)
-        judged = evaluate_dwell(trace(yaw_rate=lambda t, width=width: fall(t, width)), A)
-        ratio = judged["ratio_1000"]
-        if 0.35006 < ratio < 0.35014:
-            break
-        low, high = (width, high) if ratio < 0.3501 else (low, width)
-    stability = judged.criteria["stability"]
-    assert stability.holds is False
-    assert stability.why.startswith("35.01 % of at most 35 % at COS + 1 s")
+    assert judged.criteria["stability"].why.startswith(f"{says} of at most 35 % at COS + 1 s")
 
 
 @pytest.mark.parametrize(
@@ -202,14 +189,15 @@ def noise(size: float, seed: int = 1):
     )
 
 
-def unanswered(made: Trace, yaw_rate) -> Trace:
-    made.signals["yaw_rate"] = yaw_rate(made.time)
-    return made
-
-
 def turned(made: Trace, *names: str) -> Trace:
     for name in names:
         made.signals[name] = -made.signals[name]
+    return made
+
+
+def unanswered(yaw_rate) -> Trace:
+    made = trace()
+    made.signals["yaw_rate"] = yaw_rate(made.time)
     return made
 
 
@@ -220,7 +208,7 @@ def turned(made: Trace, *names: str) -> Trace:
         (turned(trace(), "yaw_rate"), "the yaw rate opposes the steering"),
         (turned(trace(-LARGE), "yaw_rate"), "the yaw rate opposes the steering"),
         (turned(trace(), "acceleration_y"), "the lateral acceleration opposes the steering"),
-        (unanswered(trace(), np.zeros_like), "the yaw rate does not follow the steering"),
+        (unanswered(np.zeros_like), "the yaw rate does not follow the steering"),
         (trace(yaw_rate=noise(1e-4)), "the yaw rate barely responds to the reversal"),
     ],
     ids=["steering", "yaw rate", "right first", "acceleration", "still", "no answer to the reversal"],
@@ -233,9 +221,9 @@ def test_a_car_that_does_not_answer_the_steering_is_not_judged(made, why):
     assert judged.judges_nothing
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(6))
 def test_noise_is_no_answer_and_passes_nothing(seed):
-    judged = evaluate_dwell(unanswered(trace(), noise(0.01, seed)), A)
+    judged = evaluate_dwell(unanswered(noise(0.01, seed)), A)
     assert judged.criteria["stability"].status is not Status.PASSED
 
 
@@ -257,15 +245,16 @@ def test_a_slow_steer_whose_acceleration_opposes_it_has_no_angle():
 
 def test_responsiveness_is_asked_from_5_a_on_a_dry_road_at_80_km_h():
     assert "responsiveness" not in evaluate_dwell(trace(4.99 * A), A).criteria
-    assert verdicts(evaluate_dwell(trace(5.0 * A), A))["responsiveness"] == "passed"
-    assert verdicts(evaluate_dwell(trace(friction=0.4), A)) == {
-        "stability": "passed",
-        "responsiveness": "not judged",
-    }
-    assert verdicts(evaluate_dwell(trace(), None))["responsiveness"] == "not judged"
     slow = trace()
     slow.signals["velocity_x"][:] = 77.0 / 3.6
-    assert set(verdicts(evaluate_dwell(slow, A)).values()) == {"not judged"}
+    for made, angle, stability, responsiveness in (
+        (trace(5.0 * A), A, "passed", "passed"),
+        (trace(friction=0.4), A, "passed", "not judged"),
+        (trace(), None, "passed", "not judged"),
+        (slow, A, "not judged", "not judged"),
+    ):
+        wanted = {"stability": stability, "responsiveness": responsiveness}
+        assert verdicts(evaluate_dwell(made, angle)) == wanted
 
 
 def test_a_heavy_car_may_be_slower():
@@ -293,31 +282,31 @@ def test_a_car_that_hardly_steers_has_the_largest_amplitude_for_its_only_one():
     assert [degrees(x) for x in amplitudes(radians(350.0))] == pytest.approx([300.0])
 
 
-def test_a_series_passes_only_if_no_run_is_missing_fails_or_is_not_judged():
-    def runs(*, without=None, spoil=None):
-        made = []
-        for side in (1.0, -1.0):
-            for amplitude in amplitudes(A):
-                judged = Evaluation(f"{degrees(side * amplitude):.0f}")
-                judged.add("amplitude", "amplitude", side * amplitude, "rad")
-                judged.rule("stability", Verdict(Status.PASSED))
-                judged.rule("responsiveness", Verdict(Status.PASSED))
-                made.append(judged)
-        if spoil is not None:
-            made[5].rule("stability", spoil)
-        return [one for k, one in enumerate(made) if k != without]
-
-    passed = judge_series(runs(), A)
-    assert passed.data["verdict"] is Status.PASSED
-    assert "has passed, with" in passed.summary
-    missing = judge_series(runs(without=3), A)
-    assert missing.data["verdict"] is Status.FAILED
-    assert mentions(missing.criteria["stability"].why, "1 runs", "+108.0 degrees")
-    assert "has not passed (stability and responsiveness not judged)" in missing.summary
-    failed = judge_series(runs(spoil=Verdict(Status.FAILED)), A)
-    assert mentions(failed.criteria["stability"].why, "1", "26 runs", "144.0 degrees", "fail", "smallest")
-    assert "has failed (stability)" in failed.summary
-    assert judge_series(runs(spoil=not_judged("too short")), A).data["verdict"] is Status.FAILED
+@pytest.mark.parametrize(
+    "spoilt, why, summary",
+    [
+        ("missing", ("1 runs", "+108.0 degrees"), "has not passed (stability and responsiveness not judged)"),
+        (Status.FAILED, ("1", "26 runs", "144.0 degrees", "fail", "smallest"), "has failed (stability)"),
+        (Status.NOT_JUDGED, ("1", "26 runs"), "has not passed (stability not judged)"),
+        (Status.PASSED, ("26 runs",), "has passed, with"),
+    ],
+)
+def test_a_series_passes_only_if_no_run_is_missing_fails_or_is_not_judged(spoilt, why, summary):
+    runs = []
+    for amplitude in (side * amplitude for side in (1.0, -1.0) for amplitude in amplitudes(A)):
+        judged = Evaluation(f"{degrees(amplitude):.0f}")
+        judged.add("amplitude", "amplitude", amplitude, "rad")
+        judged.rule("stability", Verdict(Status.PASSED))
+        judged.rule("responsiveness", Verdict(Status.PASSED))
+        runs.append(judged)
+    if spoilt == "missing":
+        del runs[3]
+    else:
+        runs[5].rule("stability", Verdict(spoilt))
+    series = judge_series(runs, A)
+    assert series.data["verdict"] is (Status.PASSED if spoilt is Status.PASSED else Status.FAILED)
+    assert mentions(series.criteria["stability"].why, *why)
+    assert summary in series.summary
 
 
 def test_runs_of_one_amplitude_are_no_series():
@@ -330,15 +319,9 @@ def test_runs_of_one_amplitude_are_no_series():
 def slow_steer(side=1.0, *, sampling=SAMPLING["1 kHz"], offset=0.0) -> Trace:
     """Return 13.5 deg/s of hand wheel, and an acceleration of 0.3 g at 40 degrees; 5 g/rad2 fall off."""
     t = sampling(9.0)
-    delta = radians(13.5) * np.maximum(t - 2.0, 0.0)
-    return Trace(
-        "slow",
-        t,
-        {
-            "steering_wheel_angle": side * delta + offset,
-            "acceleration_y": side * 0.3 * G * delta / radians(40.0),
-        },
-    )
+    hand = side * radians(13.5) * np.maximum(t - 2.0, 0.0)
+    signals = {"steering_wheel_angle": hand + offset, "acceleration_y": 0.3 * G * hand / radians(40.0)}
+    return Trace("slow", t, signals)
 
 
 @as_sampled
@@ -376,6 +359,9 @@ files: [run.csv]
 """
 
 
+COARSE = ("--set", "step_size=0.005")
+
+
 def write_measured(made: Trace, file: Path) -> None:
     """Write a trace as other programs would, under other names and in other units."""
     columns = {
@@ -393,9 +379,8 @@ def test_measured_columns_under_other_names_units_and_signs_give_the_same(tmp_pa
     made = trace(sampling=SAMPLING["200 Hz"])
     write_measured(made, tmp_path / "run.csv")
     (tmp_path / "map.yaml").write_text(MAPPING)
-    ended = status_of("evaluate", "sine-with-dwell", "map.yaml", "--angle", "36 deg",
-                 "--out", "out", "--no-figures")  # fmt: skip
-    assert ended == 0
+    options = ("--angle", "36 deg", "--out", "out", "--no-figures")
+    assert status_of("evaluate", "sine-with-dwell", "map.yaml", *options) == 0
     found = json.loads((tmp_path / "out/evaluation.json").read_text())["runs"][0]
     exact = evaluate_dwell(made, A)
     assert found["verdict"] == "passed"
@@ -404,18 +389,10 @@ def test_measured_columns_under_other_names_units_and_signs_give_the_same(tmp_pa
     assert mentions([why["message"] for why in found["diagnostics"]], "sideslip", "spin", "ratios")
 
 
-UNITS_GIVEN = {
-    "in the header": "Zeit [ms],LRW [deg],Gier [deg/s],ay [cm/s2]\n",
-    "in a row": "Zeit,LRW,Gier,ay\nms,deg,deg/s,cm/s2\n",
-    "in a row with brackets": "Zeit,LRW,Gier,ay\n[ms],[deg],[deg/s],[cm/s2]\n",
-    "mixed": "Zeit [ms],LRW,Gier,ay\n-,deg,deg/s,cm/s2\n",
-}
-
-
-@pytest.mark.parametrize("heading", UNITS_GIVEN.values(), ids=UNITS_GIVEN)
-def test_units_of_measured_columns_are_read_from_the_file(heading, tmp_path):
+def test_units_may_stand_in_the_header_and_in_a_row_below(tmp_path):
     made, file = trace(sampling=SAMPLING["200 Hz"]), tmp_path / "run.csv"
     write_measured(made, file)
+    heading = "Zeit [ms],LRW,Gier,ay\n-,deg,deg/s,cm/s2\n"
     file.write_text(heading + file.read_text().partition("\n")[2])
     (tmp_path / "map.yaml").write_text(
         "files: [run.csv]\ntime: Zeit\n"
@@ -436,60 +413,41 @@ def test_a_few_spikes_of_an_accelerometer_are_no_wrong_unit(tmp_path):
     assert read["acceleration_y"].max() == pytest.approx(90.0)
 
 
-def test_an_evaluation_that_judges_nothing_says_so_and_ends_with_1(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    made = turned(trace(sampling=SAMPLING["200 Hz"]), "steering_wheel_angle")
-    names = ("steering_wheel_angle", "yaw_rate", "acceleration_y")
-    table = np.column_stack([made.time, *(made[name] for name in names)])
-    np.savetxt("run.csv", table, "%.12g", ",", header="t,a [rad],r [rad/s],ay [m/s2]", comments="")
-    signals = "files: [run.csv]\nsignals: {steering_wheel_angle: a, yaw_rate: r, acceleration_y: ay}\n"
-    mapping = f"time: {{column: t, unit: s}}\n{signals}"
-    (tmp_path / "map.yaml").write_text(mapping)
-    options = ("--out", "out", "--no-figures")
-    command = ("evaluate", "sine-with-dwell", "map.yaml", *options)
-    assert status_of(*command) == 1
-    said = capsys.readouterr()
-    assert mentions(said.out, "yaw", "rate")
-    assert mentions(said.err, "judged")
-    (tmp_path / "map.yaml").write_text(mapping.replace("a, yaw", "{column: a, sign: -1}, yaw"))
-    assert status_of(*command) == 0
+def test_an_evaluation_that_judges_nothing_says_so_and_ends_with_1(tmp_path, yawbench):
+    made = trace(sampling=SAMPLING["200 Hz"])
+    command = ("evaluate", "sine-with-dwell", tmp_path / "map.yaml", "--out", tmp_path, "--no-figures")
+    (tmp_path / "map.yaml").write_text(MAPPING)
+    write_measured(turned(made, "steering_wheel_angle"), tmp_path / "run.csv")
+    status, shown, said = yawbench(*command)
+    assert status == 1 and mentions(shown, "yaw", "rate") and mentions(said, "judged")
+    write_measured(turned(made, "steering_wheel_angle"), tmp_path / "run.csv")
+    assert yawbench(*command)[0] == 0
 
 
 @pytest.mark.parametrize(
     "wrong, names",
     [
-        (("yaw_rate", "yaw_rat"), ("'yaw_rat'", "'yaw_rate'")),
-        (("deg,", "grad,"), ("'grad'", "unit")),
-        (("LRW", "Lenkrad"), ("'Lenkrad'", "column")),
-        (("unit: deg,", "unit: kg,"), ("'LRW'", "'kg'", "rad")),
-        (("yaw_rate: Gier", "yaw_rate: {column: Gier, unit: rad/s}"),
-         ("yaw_rate", "45.7 rad/s", "5 rad/s", "'deg/s'")),
-        (("unit: deg,", "unit: rad,"),
-         ("steering_wheel_angle", "270 rad", "12.57 rad", "'deg'")),
+        (("unit: deg,", "unit: rad,"), ("steering_wheel_angle", "270 rad", "12.57 rad", "'deg'")),
         (("unit: cm/s2", "unit: m/s2"), ("acceleration_y", "car", "reaches")),
         (("unit: cm/s2", "unit: g"), ("acceleration_y", "car", "reaches")),
-        (("{column: ay, unit: cm/s2}", "ay"),
-         ("'ay'", "'acceleration_y: {column: ay, unit: m/s2}'", "'ay [m/s2]'")),
         (("{column: Zeit, unit: ms}", "Zeit"), ("'Zeit'", "column", "unit")),
         (("1.8 t", "1.8 m"), ("'1.8 m'", "value")),
-        (("1.8 t", "1800"), ("vehicle.mass", "1800")),
     ],
-)  # fmt: skip
-def test_a_wrong_mapping_is_answered_by_a_sentence(wrong, names, tmp_path, capsys):
+)
+def test_a_wrong_unit_is_answered_by_a_sentence(wrong, names, tmp_path, yawbench):
     write_measured(trace(sampling=SAMPLING["200 Hz"]), tmp_path / "run.csv")
     (tmp_path / "map.yaml").write_text(MAPPING.replace(*wrong))
-    ended = status_of("evaluate", "sine-with-dwell", tmp_path / "map.yaml")
-    assert ended in (1, 2)
-    assert mentions(capsys.readouterr().err, *names)
+    status, _, said = yawbench("evaluate", "sine-with-dwell", tmp_path / "map.yaml")
+    assert status in (1, 2) and mentions(said, *names)
 
 
 @pytest.mark.exhaustive
-def test_a_series_is_driven_from_a_and_goes_on_where_it_was(tmp_path, capsys):
+def test_a_series_is_driven_from_a_and_goes_on_where_it_was(tmp_path, yawbench):
     """With steps of 5 ms; A = 180 degrees asks for two amplitudes to each side."""
     series = tmp_path / "series"
-    settings = ("--set", "step_size=0.005", "--angle", "180 deg", "--out", series)
-    assert status_of("drive", "sine-with-dwell", *settings) == 0
-    first = capsys.readouterr()
+    command = ("drive", "sine-with-dwell", *COARSE, "--angle", "180 deg", "--out", series)
+    status, first, _ = yawbench(*command)
+    assert status == 0
     found = json.loads((series / "evaluation.json").read_text())
     amplitudes_ = [degrees(one["quantities"]["amplitude"]["value"]) for one in found["runs"]]
     assert amplitudes_ == pytest.approx([270.0, 300.0, -270.0, -300.0])
@@ -499,62 +457,44 @@ def test_a_series_is_driven_from_a_and_goes_on_where_it_was(tmp_path, capsys):
         for key in ("ratio_1000", "ratio_1750", "displacement", "sideslip"):
             assert one[key]["value"] == pytest.approx(other[key]["value"], abs=1e-6), key
     assert (series / "sine_with_dwell_series.png").is_file()
-    assert status_of("drive", "sine-with-dwell", *settings) == 0
-    again = capsys.readouterr()
-    assert mentions(again.err, "4 runs", "sine", "dwell")
-    assert again.out == first.out
+    status, again, said = yawbench(*command)
+    assert (status, again) == (0, first) and mentions(said, "4 runs", "sine", "dwell")
 
 
 @pytest.mark.exhaustive
-def test_a_series_with_a_car_that_rolls_over_has_a_verdict(tmp_path, capsys):
-    high = ("--vehicle", "van", "--set", "plant.cg_height=1.1", "--set", "step_size=0.005")
-    assert status_of("drive", "sine-with-dwell", *high, "--angle", "200 deg", "--out", tmp_path) == 1
-    assert capsys.readouterr().err.count("the car has rolled over") == 2
+def test_a_series_with_a_car_that_rolls_over_has_a_verdict(tmp_path, yawbench):
+    high = ("--vehicle", "van", "--set", "plant.cg_height=1.1", *COARSE, "--angle", "200 deg")
+    status, _, said = yawbench("drive", "sine-with-dwell", *high, "--out", tmp_path)
+    assert status == 1 and said.count("the car has rolled over") == 2
     found = json.loads((tmp_path / "evaluation.json").read_text())
     assert found["series"]["verdict"] == "failed"
     assert found["series"]["criteria"]["stability"]["verdict"] == "not judged"
 
 
 @pytest.mark.parametrize(
-    "options, names",
+    "test, options, names",
     [
-        (("--vehicle", "large_salon"), ("'large_saloon'",)),
-        (("--set", "driver.amplitude=1"), ("driver.amplitude", "series", "itself")),
-        (("--angle", "400 deg"), ("--angle", "0", "360 degrees")),
-        (("--angle", "3 m"), ("--angle", "'3 m'")),
+        ("sine-with-dwell", ("--vehicle", "large_salon"), ("'large_saloon'",)),
+        ("sine-with-dwell", ("--set", "driver.amplitude=1"), ("driver.amplitude", "series", "itself")),
+        ("sine-with-dwell", ("--angle", "400 deg"), ("--angle", "0", "360 degrees")),
+        ("sine-with-dwell", ("--angle", "3 m"), ("--angle", "'3 m'")),
+        ("iso-3888-2", ("--angle", "40 deg"), ("iso-3888-2", "--angle", "--slow-steer")),
+        ("iso-3888-2", ("--set", "speed=70km/h"), ("speed", "series", "itself")),
     ],
 )
-def test_what_a_series_cannot_be_driven_with_is_said_before_any_run(options, names, capsys, tmp_path):
-    assert status_of("drive", "sine-with-dwell", *options, "--out", tmp_path / "out") == 2
-    assert mentions(capsys.readouterr().err, *names)
+def test_what_a_series_cannot_be_driven_with_is_said_before_any_run(test, options, names, yawbench, tmp_path):
+    status, _, said = yawbench("drive", test, *options, "--out", tmp_path / "out")
+    assert status == 2 and mentions(said, *names)
     assert not list(tmp_path.rglob("run.json"))
 
 
-@pytest.mark.parametrize(
-    "options, names",
-    [
-        (("--angle", "40 deg"), ("iso-3888-2", "--angle", "--slow-steer")),
-        (("--set", "speed=70km/h"), ("speed", "series", "itself")),
-    ],
-)
-def test_what_a_series_of_lane_changes_cannot_be_driven_with_is_said_before_any_run(
-    options, names, capsys, tmp_path
-):
-    assert status_of("drive", "iso-3888-2", *options, "--out", tmp_path / "out") == 2
-    assert mentions(capsys.readouterr().err, *names)
-    assert not list(tmp_path.rglob("run.json"))
-
-
-def test_a_series_of_lane_changes_finds_the_highest_clean_speed_and_goes_on_where_it_was(tmp_path, capsys):
-    series = tmp_path / "series"
-    settings = ("--set", "step_size=0.005", "--out", series)
-    assert status_of("drive", "iso-3888-2", *settings) == 0
-    first = capsys.readouterr()
-    found = json.loads((series / "evaluation.json").read_text())
-    highest, touched = (found["series"][key] for key in ("highest_clean_entry_speed", "lowest_not_clean"))
-    assert 55.0 < 3.6 * highest < 3.6 * touched < 3.6 * highest + 0.5
-    assert (series / "lane_change_series.png").is_file()
-    assert status_of("drive", "iso-3888-2", *settings) == 0
-    again = capsys.readouterr()
-    assert again.out == first.out
-    assert mentions(again.err, "km/h", "1 run")
+def test_a_series_of_lane_changes_finds_the_highest_clean_speed_and_goes_on_where_it_was(tmp_path, yawbench):
+    command = ("drive", "iso-3888-2", *COARSE, "--out", tmp_path)
+    status, first, _ = yawbench(*command)
+    assert status == 0
+    found = json.loads((tmp_path / "evaluation.json").read_text())["series"]
+    highest, touched = (3.6 * found[key] for key in ("highest_clean_entry_speed", "lowest_not_clean"))
+    assert 55.0 < highest < touched < highest + 0.5
+    assert (tmp_path / "lane_change_series.png").is_file()
+    status, again, said = yawbench(*command)
+    assert (status, again) == (0, first) and mentions(said, "km/h", "1 run")

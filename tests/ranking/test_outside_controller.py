@@ -18,31 +18,22 @@ from tests.ranking.test_ranking import SMALL, rows
 PAGE = "docs/own_controller.md"
 
 
-@pytest.fixture
-def typed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
-    """Write and type what the page shows, go where that leads; return the last command."""
+@pytest.mark.exhaustive
+@pytest.mark.skipif(sys.platform != "linux" or shutil.which("cc") is None, reason="compiles for Linux")
+def test_an_fmu_in_c_is_ranked_by_the_commands_of_the_docs(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     for block in blocks(PAGE):
         if block.path.startswith("yaw_guard/"):
-            (tmp_path / block.path).parent.mkdir(exist_ok=True)
-            (tmp_path / block.path).write_text(block.text, encoding="utf-8")
+            Path(block.path).parent.mkdir(exist_ok=True)
+            Path(block.path).write_text(block.text, encoding="utf-8")
     shown = re.search(r"```text\n(cd yaw_guard .*?)```", (ROOT / PAGE).read_text(encoding="utf-8"), re.DOTALL)
     assert shown is not None
     *building, last = shown[1].strip().splitlines()
-    subprocess.run(["sh", "-ec", "\n".join(building)], cwd=tmp_path, check=True)
-    monkeypatch.chdir(tmp_path)
-    return last
-
-
-@pytest.mark.exhaustive
-@pytest.mark.skipif(sys.platform != "linux" or shutil.which("cc") is None, reason="compiles for Linux")
-def test_an_fmu_in_c_is_ranked_by_the_command_of_the_docs(typed, tmp_path):
-    program, command, *options = typed.split()
+    subprocess.run(["sh", "-ec", "\n".join(building)], check=True)
+    program, command, *options = last.split()
     assert (program, command) == (".venv/bin/yawbench", "rank")
-    file, out = tmp_path / "small.yaml", tmp_path / "out"
-    file.write_text(SMALL)
-    assert status_of("rank", file, *options, "--condition", "dry", "--jobs", 1, "--out", out) == 0
-    found = {row["entry"]: row for row in rows(out / "cells.csv")}
-    assert {name: row["state"] for name, row in found.items()} == {
-        "yaw_guard": "passed", "fuzzy_pid": "passed", "none": "failed",
-    }  # fmt: skip
-    assert "yaw_guard" in (out / "report.html").read_text(encoding="utf-8")
+    Path("small.yaml").write_text(SMALL)
+    assert status_of("rank", "small.yaml", *options, "--condition", "dry", "--jobs", 1, "--out", "out") == 0
+    found = {row["entry"]: row["state"] for row in rows(Path("out/cells.csv"))}
+    assert found == {"yaw_guard": "passed", "fuzzy_pid": "passed", "none": "failed"}
+    assert "yaw_guard" in Path("out/report.html").read_text(encoding="utf-8")

@@ -31,17 +31,17 @@ def driven(tmp_path_factory) -> SimpleNamespace:
     folder = tmp_path_factory.mktemp("ranking")
     file, out = folder / "small.yaml", folder / "out"
     file.write_text(SMALL)
-    told, printed, lacking = [], [], {}
+    told, printed, tables = [], [], []
     for only in (("--only", "fuzzy_pid"), ()):
-        with (
-            contextlib.redirect_stderr(io.StringIO()) as said,
-            contextlib.redirect_stdout(io.StringIO()) as shown,
-        ):
-            assert status_of("rank", file, "--out", out, "--jobs", 2, *only) == 0
+        said, shown = io.StringIO(), io.StringIO()
+        with contextlib.redirect_stderr(said), contextlib.redirect_stdout(shown):
+            assert status_of("rank", file, "--out", out, "--jobs", 1, *only) == 0
         told.append(said.getvalue())
         printed.append(shown.getvalue())
-        lacking = lacking or {"rows": rows(out / "table.csv"), "page": (out / "report.html").read_text()}
-    return SimpleNamespace(file=file, out=out, told=told, printed=printed, **lacking)
+        tables.append(rows(out / "table.csv"))
+        if only:
+            assert mentions((out / "report.html").read_text(), "build", "control")
+    return SimpleNamespace(file=file, out=out, told=told, printed=printed, tables=tables)
 
 
 @pytest.fixture(scope="module")
@@ -57,68 +57,68 @@ def test_entries_that_were_not_asked_for_are_not_printed_but_counted(driven):
     assert "--only" not in every
 
 
-def test_a_small_matrix_goes_on_where_it_was_and_shows_what_is_missing(driven, page, tmp_path, capsys):
+def test_a_small_matrix_goes_on_where_it_was_and_shows_what_is_missing(driven):
+    first, found = driven.tables
     assert "missing" not in driven.told[0]
-    assert mentions(driven.page, "build", "control")
-    assert [(one["entry"], one["place"]) for one in driven.rows] == [("fuzzy_pid", "1"), ("none", "")]
+    assert [(one["entry"], one["place"]) for one in first] == [("fuzzy_pid", "1"), ("none", "")]
     assert mentions(driven.told[1], "4 runs", "2", "finished")
-    out = driven.out
-    found = rows(out / "table.csv")
-    assert [(one["entry"], one["place"], one["passed"]) for one in found] == [
-        ("fuzzy_pid", "1", "2"), ("none", "1", "0"),
-    ]  # fmt: skip
-    assert found[0] == driven.rows[0]  # what has been made is not made again
-    cells = {(one["entry"], one["condition"]): one for one in rows(out / "cells.csv")}
-    assert {key: one["state"] for key, one in cells.items()} == {
-        ("fuzzy_pid", "dry"): "passed", ("fuzzy_pid", "low"): "passed",
-        ("none", "dry"): "failed", ("none", "low"): "failed",
-    }  # fmt: skip
+    placed = [(one["entry"], one["place"], one["passed"]) for one in found]
+    assert placed == [("fuzzy_pid", "1", "2"), ("none", "1", "0")]
+    assert found[0] == first[0]  # what has been made is not made again
+    cells = [(one["entry"], one["state"]) for one in rows(driven.out / "cells.csv")]
+    assert sorted(cells) == 2 * [("fuzzy_pid", "passed")] + 2 * [("none", "failed")]
     assert 0 < float(found[0]["step_time [s]"]) < 0.005
     held, free = (float(one["intervention [N.m.s]"]) for one in found)
     assert free < 0.001 * held  # what the engine's lag leaves of the driver's force
-    assert len(rows(out / "runs.csv")) == 4
+
+
+def test_every_cell_of_the_matrix_opens_its_worst_run(driven, page):
+    assert len(rows(driven.out / "runs.csv")) == 4
     assert 'href="#cell?id=fuzzy-pid-in-low"' in page.read_text()
-    sides = {path.stem: path.read_text() for path in (out / "data").glob("*.js")}
+    sides = {path.stem: path.read_text() for path in (driven.out / "data").glob("*.js")}
     assert set(sides) == {f"{entry}-in-{name}" for entry in ("fuzzy-pid", "none") for name in ("dry", "low")}
-    (low,) = (one for one in rows(out / "runs.csv") if (one["entry"], one["condition"]) == ("none", "low"))
     content = json.loads(sides["none-in-low"].partition(", ")[2].rstrip(");\n"))
     run, *_ = content["data"]["runs"]  # then the best of those that hold the car
     assert {"x", "y", "yaw"} <= set(run["road"])  # what the car on the road needs
-    assert low["verdict"] in content["html"]
+    assert lost_run(driven)["verdict"] in content["html"]
     assert mentions(content["html"], "sine-with-dwell", "drive")
-    assert status_of("rank", driven.file, "--out", out, "--no-run", "--json") == 0
-    answer = json.loads(capsys.readouterr().out)
+
+
+def test_answers_and_verdicts_for_other_programs_are_those_of_the_matrix(driven, page, tmp_path, yawbench):
+    again = ("rank", driven.file, "--out", driven.out, "--no-run")
+    status, said, _ = yawbench(*again, "--json")
+    answer = json.loads(said)
+    assert status == 0 and (answer["page"], answer["folder"]) == (str(page), str(driven.out))
     places = {entry["entry"]: entry["place"] for entry in answer["entries"]}
     assert places == {"fuzzy_pid": 1, "none": 1}
-    assert (answer["page"], answer["folder"]) == (str(page), str(out))
-    judged = ("--no-run", "--strict", "--junit", tmp_path / "verdicts.xml")
-    assert status_of("rank", driven.file, "--out", out, *judged) == 1
+    assert yawbench(*again, "--strict", "--junit", tmp_path / "verdicts.xml")[0] == 1
     root = ElementTree.parse(tmp_path / "verdicts.xml").getroot()
     assert (root.get("tests"), root.get("failures"), root.get("errors")) == ("4", "2", "0")
-    slip = float(low["sideslip [rad]"])
-    assert mentions(root.find(".//testcase[@name='low']/failure").get("message"), f"{degrees(slip):.3g}")
+    slip = degrees(float(lost_run(driven)["sideslip [rad]"]))
+    assert mentions(root.find(".//testcase[@name='low']/failure").get("message"), f"{slip:.3g}")
+
+
+def lost_run(driven) -> dict[str, str]:
+    every = rows(driven.out / "runs.csv")
+    (lost,) = (one for one in every if (one["entry"], one["condition"]) == ("none", "low"))
+    return lost
+
+
+def opened(chromium: Browser, page: Path, width: int = DESK) -> None:
+    chromium.open(page, width=width)
+    chromium.wait_for("document.querySelector('.chosen .yv-ready')")
 
 
 @pytest.mark.parametrize(("width", "colours"), looks(PHONE, DESK, narrow=True))
 def test_the_first_cell_is_open_and_all_of_it_can_be_read_by_everyone(
     chromium: Browser, page, width, colours
 ):
-    chromium.open(page, width=width)
-    chromium.wait_for("document.querySelector('.chosen .yv-ready')")
+    opened(chromium, page, width)
     assert chromium.console() == []
     assert chromium.overflow() <= 0
     assert chromium.run("return document.querySelectorAll('main').length") == 1
     assert inaccessible(chromium, colours) == []
     assert flaws_in_print(chromium) == []
-    chromium.open(page, width=width)
-    chromium.wait_for("document.querySelector('.chosen .yv-ready')")
-    chromium.run("document.querySelector(\"td.cell a[href$='none-in-low']\").click()")
-    chromium.wait_for("document.querySelector('.ranking').dataset.shown === 'none-in-low'")
-    top, bar = chromium.run(
-        "const box = (name) => document.querySelector(name).getBoundingClientRect();"
-        "return [box('.chosen h2').top, box('nav.top').bottom]"
-    )
-    assert top >= bar  # the heading of what was chosen is not behind the links at the top
 
 
 def test_threats_are_quoted_where_they_can_be_read(tmp_path):
@@ -131,14 +131,16 @@ def test_threats_are_quoted_where_they_can_be_read(tmp_path):
 
 
 def test_a_cell_shows_its_worst_run_while_the_matrix_stays_in_sight(chromium: Browser, page):
-    chromium.open(page, width=1440)
-    chromium.wait_for("document.querySelector('.chosen .yv-ready')")
+    opened(chromium, page)
     for cell, runs in (("fuzzy-pid-in-low", ["fuzzy PID"]), ("none-in-low", ["no control", "fuzzy PID"])):
         chromium.run("document.querySelector(`td.cell a[href$='${arguments[0]}']`).click()", cell)
         chromium.wait_for(f"document.querySelector('.ranking').dataset.shown === '{cell}'")
         chromium.wait_for("document.querySelector('.chosen .yv-ready')")
-        top = chromium.run("return document.querySelector('.matrix').getBoundingClientRect().top")
-        assert 0 <= top < 900
+        top, heading, bar = chromium.run(
+            "const box = (name) => document.querySelector(name).getBoundingClientRect();"
+            "return [box('.matrix').top, box('.chosen h2').top, box('nav.top').bottom]"
+        )
+        assert 0 <= top < 900 and heading >= bar  # which is not behind the links at the top
         labels = chromium.run(
             "return document.querySelector('.chosen .yv').viewer.runs.map(({label}) => label.split(',')[0])"
         )
@@ -154,8 +156,7 @@ PANELS = "return document.querySelector('.chosen .yv').viewer.state.panels"
 
 
 def test_of_two_quick_choices_the_last_is_shown_with_the_panels_of_the_viewer_before(chromium: Browser, page):
-    chromium.open(page)
-    chromium.wait_for("document.querySelector('.chosen .yv-ready')")
+    opened(chromium, page)
     at_first = chromium.run(PANELS)
     shown = chromium.run(
         HELD + CHOSEN + "const {viewer} = chosen.querySelector('.yv');"

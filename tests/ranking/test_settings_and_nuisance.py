@@ -7,10 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from yawbench.foundation.errors import ScenarioError
 from yawbench.ranking.nuisance import OrdinaryRun, nuisance_of, nuisance_table
 from yawbench.ranking.ranking import load_ranking
-from yawbench.ranking.ranking_scores import placed
+from yawbench.ranking.ranking_scores import RankingCell, placed
 from yawbench.ranking.settings import SettingScores, order_kept, settings_sentence, settings_table
 
 from .test_ranking import SMALL, driven, standing
@@ -47,10 +46,7 @@ def under(ranking, title: str, **passes: int) -> SettingScores:
 
 
 def test_an_order_is_kept_that_no_setting_turns_round(ranking):
-    settings = [
-        under(ranking, "as it is", a=4, b=3, c=2, d=2),
-        under(ranking, "slow", a=3, b=3, c=4, d=4),
-    ]
+    settings = [under(ranking, "as it is", a=4, b=3, c=2, d=2), under(ranking, "slow", a=3, b=3, c=4, d=4)]
     order = order_kept(settings)
     assert order.kept == [("a", "b")]
     assert (order.changed, order.equal, order.pairs) == (4, 1, 6)
@@ -58,35 +54,25 @@ def test_an_order_is_kept_that_no_setting_turns_round(ranking):
 
 
 def test_the_table_of_settings_counts_the_controllers_that_pass(ranking):
-    with_none = [under(ranking, title, **given) for title, given in (("own", {"0": 1}), ("slow", {"0": 0}))]
-    cells = [replace(one.scores[0], cells={"dry": one.scores[0].cells["0"]}) for one in with_none]
-    own = [
-        replace(one, ranking=ranking.under(""), scores=[c]) for one, c in zip(with_none, cells, strict=True)
-    ]
+    own = []
+    for title, passes in (("own", True), ("slow", False)):
+        cell = RankingCell("0", "dry", [driven(stability=float(passes))])
+        score = replace(standing("0"), cells={"dry": cell})
+        own.append(SettingScores(title, title, ranking.under(""), placed([score])))
     assert [row[1] for row in settings_table(own).rows] == ["1 of 1", "0 of 1"]
 
 
-def run(entry: str, situation: str, car: str, braking: float, speed: float) -> OrdinaryRun:
-    return OrdinaryRun(
-        entry, situation, car, None, None, {"braking": braking, "pressure": 1e6, "speed_end": speed}
-    )
+def run(entry: str, situation: str, braking: float, speed: float) -> OrdinaryRun:
+    measured = {"braking": braking, "pressure": 1e6, "speed_end": speed}
+    return OrdinaryRun(entry, situation, "s", None, None, measured)
 
 
 def test_nuisance_is_braking_and_speed_against_no_control_where_the_driver_does_not_brake(ranking):
     runs = [
-        run("none", "sine", "s", 0.0, 22.0), run("fuzzy_pid", "sine", "s", 0.5, 20.0),
-        run("none", "stop", "s", 1.0, 3.0), run("fuzzy_pid", "stop", "s", 1.0, 5.0),
+        run("none", "sine", 0.0, 22.0), run("fuzzy_pid", "sine", 0.5, 20.0),
+        run("none", "stop", 1.0, 3.0), run("fuzzy_pid", "stop", 1.0, 5.0),
     ]  # fmt: skip
     score = nuisance_of(ranking, runs).scores["fuzzy_pid"]
     assert (score.braking(), score.speed_lost, score.speed_kept) == (0.5, 2.0, 2.0)
     assert [row[0] for row in nuisance_table(nuisance_of(ranking, runs)).rows] == ["no control", "fuzzy PID"]
     assert not nuisance_of(ranking, runs[:1]).scores["fuzzy_pid"].runs
-
-
-def test_an_unknown_car_or_condition_is_named(tmp_path):
-    for wrong in ("setting_conditions: [wet]", "ordinary: {x: {title: x, scenario: s.yaml, cars: [truck]}}"):
-        file = tmp_path / "wrong.yaml"
-        file.write_text(SMALL + wrong)
-        name = "wet" if "wet" in wrong else "truck"
-        with pytest.raises(ScenarioError, match=name):
-            load_ranking(file)

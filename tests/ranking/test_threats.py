@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import csv
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from tests.checkout import ROOT
-from tests.command_line import status_of
+from tests.ranking.test_ranking import SMALL as RANKING
+from tests.ranking.test_ranking import rows
 from tests.refusals import mentions
 from tests.reports.made_up import unpacked
 from yawbench.foundation.errors import ScenarioError
@@ -27,8 +28,7 @@ from yawbench.ranking.threat_scores import (
     scores_without,
 )
 from yawbench.ranking.threat_tables import car_tables
-from yawbench.ranking.threats import LoadedThreats, QuantitySpec, ThreatSpec, load_threats
-from yawbench.reports.page_parts import _templates
+from yawbench.ranking.threats import LoadedThreats, QuantitySpec, SearchPlace, ThreatSpec, load_threats
 from yawbench.studies.executor import side_by_side
 
 UNITS = (
@@ -105,12 +105,7 @@ def shipped() -> LoadedThreats:
 @pytest.mark.parametrize(
     "old, new, code, place",
     [
-        (
-            "cars: [saloon75, hard, motors",
-            "cars: [truck, saloon75, hard, motors",
-            "condition-unknown",
-            "truck",
-        ),
+        ("cars: [saloon75, hard", "cars: [truck, saloon75, hard", "condition-unknown", "truck"),
         ("easy: 60\n", "eazy: 60\n", "key-unknown", "threats.amplitude"),
         ("threats: [friction, mass", "threats: [frictoin, mass", "value-invalid", "frictoin"),
     ],
@@ -125,21 +120,17 @@ def test_a_wrong_threat_file_is_refused_at_its_place(old, new, code, place, tmp_
     assert any(one.code == code and place in f"{one.location} {one}" for one in refused.value.diagnostics)
 
 
-def simulated(
-    chance: np.random.Generator, skills: np.ndarray, threats: int = 13, cars: int = 6
-) -> np.ndarray:
-    """Positions of entries whose skill counts in all threats, which scatter, as do cars."""
-    common = chance.normal(0.3, 0.1, (1, threats, 1)) + chance.normal(0.0, 0.1, (1, 1, cars))
-    own = chance.normal(0.0, 0.02, (len(skills), threats, 1)) + chance.normal(
-        0.0, 0.02, (len(skills), 1, cars)
-    )
-    return skills[:, None, None] + common + own + chance.normal(0.0, 0.02, (len(skills), threats, cars))
+def simulated(chance: np.random.Generator, *skills: float) -> np.ndarray:
+    """Positions of entries whose skill counts in all of 13 threats, which scatter, as do 6 cars."""
+    common = chance.normal(0.3, 0.1, (1, 13, 1)) + chance.normal(0.0, 0.1, (1, 1, 6))
+    own = chance.normal(0.0, 0.02, (len(skills), 13, 1)) + chance.normal(0.0, 0.02, (len(skills), 1, 6))
+    noise = chance.normal(0.0, 0.02, (len(skills), 13, 6))
+    return np.array(skills)[:, None, None] + common + own + noise
 
 
 def test_a_known_order_is_recovered_by_score_and_by_rank():
-    skills = np.array([0.0, 0.05, 0.1, 0.15, 0.2])
-    names = ["none", *"abcd"]
-    table = score_table(names, simulated(np.random.default_rng(1), skills), "none")
+    positions = simulated(np.random.default_rng(1), 0.0, 0.05, 0.1, 0.15, 0.2)
+    table = score_table(["none", *"abcd"], positions, "none")
     assert table.order() == ["d", "c", "b", "a", "none"]
     assert [one.by_rank for one in table.scores] == [1, 2, 3, 4, 5]
     assert [one.place for one in table.scores] == [1, 2, 3, 4, 5]
@@ -149,16 +140,15 @@ def test_a_known_order_is_recovered_by_score_and_by_rank():
 
 
 def test_entries_of_equal_skill_share_a_place():
-    skills = np.array([0.0, 0.2, 0.2, 0.2])
-    table = score_table(["none", *"abc"], simulated(np.random.default_rng(1), skills), "none")
+    table = score_table(["none", *"abc"], simulated(np.random.default_rng(1), 0.0, 0.2, 0.2, 0.2), "none")
     assert [one.place for one in table.scores] == [1, 1, 1, 4]
 
 
 def test_intervals_hold_the_true_score_at_least_nine_times_in_ten():
     """Relative to no control and to an entry that is best by far, so that the true scores are known."""
-    skills, chance, held = np.array([0.0, 0.1, 0.3]), np.random.default_rng(3), []
-    for _ in range(300):
-        table = score_table(["none", "half", "best"], simulated(chance, skills), "none")
+    chance, held = np.random.default_rng(3), []
+    for _ in range(150):
+        table = score_table(["none", "half", "best"], simulated(chance, 0.0, 0.1, 0.3), "none")
         best, _, none = (score.mean for score in table.scores)
         bounds = table.scores[1].bounds
         distance = 100 - 100 * (0.3 - 0.1) / (best - none)  # the best's gain is taken as known
@@ -214,10 +204,9 @@ def test_orders_are_compared_by_the_entries_that_move():
     assert (moves.moved, moves.farthest, moves.before, moves.after) == (3, "a", 1, 3)
     assert moves.correlation == pytest.approx(1 - 6 * (4 + 1 + 1) / (4 * 15))
     assert moves_between(scores, {**scores, "new": 95.0}, "none").moved == 0
-    lost = moves_between(
-        {**scores, "c": 0.0, "d": 0.0}, {"none": 0.0, "d": 0.0, "c": 0.0, "b": 1.0, "a": 2.0}, "none"
-    )
-    assert lost.moved == 0, "entries that share a score share a place"
+    lost = {"none": 0.0, "d": 0.0, "c": 0.0, "b": 1.0, "a": 2.0}
+    shared = moves_between({**scores, "c": 0.0, "d": 0.0}, lost, "none")
+    assert shared.moved == 0, "entries that share a score share a place"
 
 
 def levels_of(threats: LoadedThreats, position) -> ThreatResult:
@@ -232,25 +221,22 @@ def test_a_setting_is_compared_with_the_main_one_on_its_own_threats_and_cars(shi
         return 0.5 + skill + shift
 
     result = levels_of(shipped, position)
-    stricter = compared_setting(result, "bound_15")
+    stricter, turned = (compared_setting(result, setting) for setting in ("bound_15", "unguarded"))
     assert stricter.moved == pytest.approx(-0.05)
-    assert stricter.main is not None
+    assert stricter.main is not None and turned.main is not None
     assert stricter.table.order() == stricter.main.order()
-    turned = compared_setting(result, "unguarded")
-    assert turned.main is not None
     moves = moves_between(turned.main.by_entry(), turned.table.by_entry(), "none")
     assert moves.correlation == pytest.approx(-1.0)
 
 
 def test_gains_are_compared_among_all_laws_and_among_groups_of_them(shipped):
     chance = np.random.default_rng(6)
-    of_laws: dict[str, float] = {}
-    own: dict[str, float] = {}
+    drawn: dict[str, float] = {}
 
     def position(place):
         spec = shipped.ranking.entries[place.entry][0]
-        law = of_laws.setdefault(spec.fmu, chance.normal(0.0, 0.01))
-        gain = own.setdefault(place.entry, chance.normal(0.0, 0.002))
+        law = drawn.setdefault(f"law {spec.fmu}", chance.normal(0.0, 0.01))
+        gain = drawn.setdefault(place.entry, chance.normal(0.0, 0.002))
         return 0.5 + law + gain + (0.1 if spec.gains == "tuned" else 0.0)
 
     compared = compared_gains(levels_of(shipped, position))
@@ -275,93 +261,56 @@ threats:
 settings:
   main: {{title: main, limit: 10000}}
 """
-RANKING = f"""
-title: small
-step_size: 0.005
-stop_time: 5.5
-cars:
-  s:
+OTHER_CAR = f"""  other:
     title: hard
     vehicle: {ROOT}/scenarios/vehicles/hard.yaml
     slow_steer: {GROUND}/slowly_increasing_steer.yaml
-conditions:
-  dry: {{title: dry, car: s, scenario: {GROUND}/sine_with_dwell.yaml}}
-entries:
-  none: {{title: no control, fmu: controller_off, source: the car alone}}
-  fuzzy_pid: {{title: fuzzy PID, fmu: controller_fuzzy_pid, source: paper C}}
 """
 
-OTHER_CAR = f"""  other:
-    title: soft
-    vehicle: {ROOT}/scenarios/vehicles/saloon75.yaml
-    slow_steer: {GROUND}/slowly_increasing_steer.yaml
-"""
+
+def small(folder: Path, ranking: str = RANKING, threats: str = SMALL, *levels: str) -> Path:
+    """Write a small ranking and its threats, and levels that were published; return the file of threats."""
+    (folder / "ranking.yaml").write_text(ranking)
+    if levels:
+        head = "setting,threat,car,entry,level,unit,position,end"
+        (folder / "levels.csv").write_text("\n".join([head, *levels, ""]))
+        threats += "published: {levels: levels.csv}\n"
+    (folder / "threats.yaml").write_text(threats)
+    return folder / "threats.yaml"
+
+
+def survived_everywhere(threats: LoadedThreats, **positions: float) -> dict[SearchPlace, Survived]:
+    return {place: Survived(positions.get(place.entry, 0.5), "") for place in threats.searches()}
 
 
 def test_a_setting_of_some_cars_has_tables_of_these_alone(tmp_path):
-    (tmp_path / "ranking.yaml").write_text(RANKING.replace("conditions:", OTHER_CAR + "conditions:"))
     some = SMALL.replace("cars: [s]", "cars: [other, s]").replace("limit: 10000", "limit: 10000, cars: [s]")
-    (tmp_path / "threats.yaml").write_text(some)
-    threats = load_threats(tmp_path / "threats.yaml")
+    threats = load_threats(small(tmp_path, RANKING.replace("conditions:", OTHER_CAR + "conditions:"), some))
     assert {place.car for place in threats.searches()} == {"s"}
-    survived = {place: Survived(0.5, "") for place in threats.searches()}
-    (table,) = car_tables(ThreatResult(threats, {}, survived, {}), ["fuzzy_pid"])
+    (table,) = car_tables(ThreatResult(threats, {}, survived_everywhere(threats), {}), ["fuzzy_pid"])
     assert list(table.headings) == ["controller", "s"]
 
 
-def rows(file):
-    return list(csv.DictReader(file.open(encoding="utf-8")))
+NONE = "main,friction,s,none,0.9,,0.0,easy"
 
 
-@pytest.mark.exhaustive
-def test_two_runs_from_nothing_give_the_same_tables(tmp_path, capsys, monkeypatch):
-    """Each with an empty cache and its own number of processes."""
-    (tmp_path / "ranking.yaml").write_text(RANKING)
-    (tmp_path / "threats.yaml").write_text(SMALL)
-    shared = _templates("yawbench.ranking").globals
-    monkeypatch.setitem(shared, "now", lambda: "one day")  # the runs may end in two minutes
-    for out, jobs in (("first", 1), ("second", 2)):
-        monkeypatch.setenv("YAWBENCH_CACHE", str(tmp_path / f"cache of {out}"))
-        status = status_of("rank", tmp_path / "threats.yaml", "--out", tmp_path / out, "--jobs", jobs)
-        assert status == 0, capsys.readouterr().err
-    for file in ("levels.csv", "scores.csv", "quantities.csv", "report.html"):
-        first, second = ((tmp_path / out / file).read_bytes() for out in ("first", "second"))
-        assert first.replace(b"/first", b"") == second.replace(b"/second", b""), file
-    levels = {one["entry"]: one for one in rows(tmp_path / "first" / "levels.csv")}
-    assert levels["none"]["end"] == "easy"
-    assert levels["fuzzy_pid"]["end"] == ""
-    assert 0.1 < float(levels["fuzzy_pid"]["level"]) < 0.9
-    scores = rows(tmp_path / "first" / "scores.csv")
-    assert [(one["entry"], float(one["score"])) for one in scores] == [("fuzzy_pid", 100.0), ("none", 0.0)]
-    page = unpacked(tmp_path / "first" / "report.html")
-    assert "fuzzy PID" in page
-    assert "fails at 0.90" in page
-    assert " on one day. " in page
-
-
-def test_an_entry_joins_the_published_levels_with_its_own_runs(tmp_path, capsys):
-    (tmp_path / "ranking.yaml").write_text(RANKING)
-    (tmp_path / "threats.yaml").write_text(SMALL + "published: {levels: levels.csv}\n")
-    (tmp_path / "levels.csv").write_text(
-        "setting,threat,car,entry,level,unit,position,end\nmain,friction,s,none,0.9,,0.0,easy\n"
-    )
+def test_an_entry_joins_the_published_levels_with_its_own_runs(tmp_path, yawbench):
+    file = small(tmp_path, RANKING, SMALL, NONE)
     options = ("--only", "fuzzy_pid", "--out", tmp_path / "out", "--jobs", 1)
-    assert status_of("rank", tmp_path / "threats.yaml", *options) == 0, capsys.readouterr().err
+    status, _, said = yawbench("rank", file, *options)
+    assert status == 0, said
     scores = rows(tmp_path / "out" / "scores.csv")
-    assert [one["entry"] for one in scores] == ["fuzzy_pid", "none"]
-    assert "Published levels" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert [(one["entry"], float(one["score"])) for one in scores] == [("fuzzy_pid", 100.0), ("none", 0.0)]
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "Published levels" in page and "fails at 0.90" in unpacked(page)
 
 
-def test_a_setting_that_is_chosen_is_searched_and_the_others_count_as_published(tmp_path, capsys):
-    (tmp_path / "ranking.yaml").write_text(RANKING)
-    other = "  slippery: {title: slippery, limit: 10000, bound: 30}\n"
-    (tmp_path / "threats.yaml").write_text(SMALL + other + "published: {levels: levels.csv}\n")
-    (tmp_path / "levels.csv").write_text(
-        "setting,threat,car,entry,level,unit,position,end\n"
-        "main,friction,s,none,0.9,,0.0,easy\nmain,friction,s,fuzzy_pid,0.3,,0.5,\n"
-    )
+def test_a_setting_that_is_chosen_is_searched_and_the_others_count_as_published(tmp_path, yawbench):
+    other = SMALL + "  slippery: {title: slippery, limit: 10000, bound: 30}\n"
+    file = small(tmp_path, RANKING, other, NONE, "main,friction,s,fuzzy_pid,0.3,,0.5,")
     options = ("--condition", "slippery", "--out", tmp_path / "out", "--jobs", 1)
-    assert status_of("rank", tmp_path / "threats.yaml", *options) == 0, capsys.readouterr().err
+    status, _, said = yawbench("rank", file, *options)
+    assert status == 0, said
     levels = {(row["setting"], row["entry"]): row for row in rows(tmp_path / "out" / "levels.csv")}
     assert float(levels["main", "fuzzy_pid"]["position"]) == 0.5
     assert 0.1 < float(levels["slippery", "fuzzy_pid"]["level"]) < 0.9
@@ -370,13 +319,9 @@ def test_a_setting_that_is_chosen_is_searched_and_the_others_count_as_published(
     assert "--condition slippery" in page
 
 
-def test_an_unknown_setting_is_refused_with_the_known_ones(tmp_path, capsys):
-    (tmp_path / "ranking.yaml").write_text(RANKING)
-    (tmp_path / "threats.yaml").write_text(SMALL)
-    assert status_of("rank", tmp_path / "threats.yaml", "--condition", "dry") != 0
-    message = capsys.readouterr().err
-    assert "--condition dry: unknown condition" in message
-    assert "main" in message
+def test_an_unknown_setting_is_refused_with_the_known_ones(tmp_path, yawbench):
+    status, _, said = yawbench("rank", small(tmp_path), "--condition", "dry")
+    assert status != 0 and mentions(said, "--condition dry", "main")
 
 
 def quantity(**keys) -> QuantitySpec:
@@ -398,14 +343,7 @@ def test_a_quantity_without_a_range_is_refused(keys):
         quantity(**keys)
 
 
-def test_disciplines_stand_beside_the_threats_and_entries_that_did_not_drive_them_are_left_out(tmp_path):
-    (tmp_path / "ranking.yaml").write_text(
-        RANKING + "  pid: {title: PID, fmu: controller_pid, source: here}\n"
-        "  new: {title: new, fmu: controller_pid, source: here}\n"
-    )
-    (tmp_path / "threats.yaml").write_text(
-        SMALL
-        + f"""disciplines:
+BRAKING = f"""disciplines:
   braking:
     title: Braking
     scenario: {SHIPPED}/road/split_braking.yaml
@@ -413,10 +351,14 @@ def test_disciplines_stand_beside_the_threats_and_entries_that_did_not_drive_the
     source: Here
     quantities: {{distance: {{title: distance, best: 50, worst: 200}}}}
 """
+
+
+def test_disciplines_stand_beside_the_threats_and_entries_that_did_not_drive_them_are_left_out(tmp_path):
+    more = "".join(
+        f"  {name}: {{title: {name}, fmu: controller_pid, source: here}}\n" for name in ("pid", "new")
     )
-    threats = load_threats(tmp_path / "threats.yaml")
-    positions = {"none": 0.0, "fuzzy_pid": 0.5, "pid": 0.4, "new": 0.3}
-    survived = {place: Survived(positions[place.entry], "") for place in threats.searches()}
+    threats = load_threats(small(tmp_path, RANKING + more, SMALL + BRAKING))
+    survived = survived_everywhere(threats, none=0.0, fuzzy_pid=0.5, pid=0.4, new=0.3)
     driven = {"none": None, "fuzzy_pid": 100.0, "pid": 50.0}
     quantities = {("braking", "s", entry): {"distance": value} for entry, value in driven.items()}
     units = {("braking", "distance"): "m"}
@@ -427,7 +369,7 @@ def test_disciplines_stand_beside_the_threats_and_entries_that_did_not_drive_the
     assert table.headings[-1] == "distance [m]"
     assert [row[-1] for row in table.rows] == ["50.0", "100", "lost"]
     rows_of_all = {row[0]: row[1:] for row in overview(result, scored(result)).rows}
-    assert rows_of_all["PID"] == ["3 of 4", "80 (1)", "100 (1)"]
+    assert rows_of_all["pid"] == ["3 of 4", "80 (1)", "100 (1)"]
     assert rows_of_all["fuzzy PID"] == [None, "100 (1)", "50 (1)"]
     assert rows_of_all["new"] == [None, "60 (1)", None]
     assert {row[3] for row in table.rows} == {None}, "one car says nothing about others"

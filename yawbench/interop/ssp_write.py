@@ -79,16 +79,13 @@ def write_ssp(plan: Plan, path: Path, standard: Version | None = None, *, named:
         ModelDescriptionError: an FMU no longer exists.
     """
     series = [f"{instance.name}.{name}" for instance in plan.instances for name in instance.series]
-    if series:
-        raise ResultsError(
-            f"{path}: an SSP archive cannot contain the time series of {listed(fold(series))}",
-            code="ssp-unsupported",
-        )
-    if delayed := [f"{wire.target}.{wire.input}" for wire in plan.wires if wire.delayed]:
-        raise ResultsError(
-            f"{path}: an SSP archive cannot contain the delay of {listed(fold(delayed))}",
-            code="ssp-unsupported",
-        )
+    delayed = [f"{wire.target}.{wire.input}" for wire in plan.wires if wire.delayed]
+    for what, inputs in (("time series", series), ("delay", delayed)):
+        if inputs:
+            raise ResultsError(
+                f"{path}: an SSP archive cannot contain the {what} of {listed(fold(inputs))}",
+                code="ssp-unsupported",
+            )
     sources = _sources(plan)
     standard = standard or ("2.0" if any(instance.fmu.fmi > 2 for instance in plan.instances) else "1.0")
     if standard == "1.0" and (lost := _lost(plan)):

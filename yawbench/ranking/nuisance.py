@@ -36,9 +36,8 @@ from .ranking import (
     EntrySpec,
     LoadedRanking,
     OrdinarySpec,
-    angle_experiment,
-    angles_of,
     axes_of_repeats,
+    determine_angles,
     repeats_of,
 )
 from .ranking_scores import IDLE
@@ -220,8 +219,7 @@ def run_nuisance(ranking: LoadedRanking, execute: Executor, *, only: Collection[
     """
     specs = ranking.spec.ordinary.values()
     cars = list(dict.fromkeys(car for spec in specs for car in spec.cars or ranking.spec.cars))
-    slow = execute(angle_experiment(ranking, execute, cars), keep=False).of_models()
-    experiment, places = nuisance_experiment(ranking, angles_of(ranking, slow, cars), execute)
+    experiment, places = nuisance_experiment(ranking, determine_angles(ranking, execute, cars), execute)
     result = execute(
         experiment,
         only=lambda case: not only or case.point[0].value in only,

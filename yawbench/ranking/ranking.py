@@ -408,6 +408,24 @@ def angles_of(
     return angles
 
 
+def determine_angles(
+    ranking: LoadedRanking, execute: Executor, cars: Sequence[str] | None = None
+) -> dict[str, float]:
+    """Execute the missing runs that determine A, and return car -> A [rad]; arguments as above.
+
+    Raises:
+        YawbenchError: a run cannot start or was not made, or the runs do not yield A.
+    """
+    slow = execute(angle_experiment(ranking, execute, cars), keep=False).of_models()
+    for case, record in zip(slow.experiment.cases, slow.records, strict=True):
+        if not record.made:
+            raise ResultsError(
+                f"{execute.folder}: contains no A of {case.run.name!r} for these FMUs; rank without --no-run",
+                code="runs-missing",
+            )
+    return angles_of(ranking, slow, cars)
+
+
 def dwell_experiment(
     ranking: LoadedRanking, angles: Mapping[str, float], execute: Executor
 ) -> LoadedExperiment:

@@ -26,7 +26,6 @@ from typing import NamedTuple
 
 from yawbench.figures.display import digits_apart
 from yawbench.fmus.fmu import Value
-from yawbench.foundation.errors import ResultsError
 from yawbench.proving_ground.sine_with_dwell import FROM, RATIOS, SLIGHT, SPUN
 from yawbench.studies.confidence import (
     Bounds,
@@ -48,8 +47,7 @@ from .ranking import (
     RECORDED,
     EntrySpec,
     LoadedRanking,
-    angle_experiment,
-    angles_of,
+    determine_angles,
     dwell_experiment,
 )
 
@@ -378,15 +376,7 @@ def run_ranking(
     Raises:
         YawbenchError: a run cannot start, or A cannot be determined.
     """
-    slow = execute(angle_experiment(ranking, execute), keep=False).of_models()
-    for case, record in zip(slow.experiment.cases, slow.records, strict=True):
-        if not record.made:
-            car = case.run.name
-            raise ResultsError(
-                f"{execute.folder}: contains no A of {car!r} for these FMUs; rank without --no-run",
-                code="runs-missing",
-            )
-    angles = angles_of(ranking, slow)
+    angles = determine_angles(ranking, execute)
     dwell = dwell_experiment(ranking, angles, execute)
     result = execute(
         dwell,

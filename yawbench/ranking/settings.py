@@ -163,13 +163,8 @@ def _clear(one: SettingScores) -> set[tuple[str, str]]:
     scores = [*one.controllers.values()]
     if len(scores) < 2:
         return set()
-    better = apart_by_conditions(scores).better
-    return {
-        (scores[i].entry, scores[j].entry)
-        for i in range(len(scores))
-        for j in range(len(scores))
-        if better[i, j]
-    }
+    pairs = zip(*apart_by_conditions(scores).better.nonzero(), strict=True)
+    return {(scores[better].entry, scores[worse].entry) for better, worse in pairs}
 
 
 def settings_table(settings: Sequence[SettingScores]) -> Table:

@@ -25,7 +25,7 @@ from yawbench.studies.experiment import LoadedExperiment, NamedRun, experiment_o
 from yawbench.studies.jobs import OF_MACHINE, MeasuredRun
 from yawbench.studies.tables import Table, column
 
-from .ranking import CONTROLLER, RECORDED, SERIES, angle_experiment, angles_of
+from .ranking import CONTROLLER, RECORDED, SERIES, determine_angles
 from .ranking_scores import RankedRun, RankedState
 from .threats import LANE_CHANGE, REFERENCE, LoadedThreats, SearchPlace, ThreatSpec
 
@@ -351,12 +351,7 @@ def run_threats(
     Raises:
         YawbenchError: a run cannot start, or A cannot be determined.
     """
-    slow = execute(angle_experiment(threats.ranking, execute, threats.spec.cars), keep=False)
-    if not all(record.made for record in slow.records):
-        raise ResultsError(
-            f"{execute.folder}: runs for A are missing; rank without --no-run", code="runs-missing"
-        )
-    angles = angles_of(threats.ranking, slow, threats.spec.cars)
+    angles = determine_angles(threats.ranking, execute, threats.spec.cars)
     before = published_result(threats)
     if not only and not chosen:  # everything is run, the matrix apart
         before = ThreatResult(threats, angles, {}, {}, passed=before.passed)
