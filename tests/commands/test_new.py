@@ -109,11 +109,11 @@ def test_an_exercise_is_failed_as_it_begins_and_passed_with_a_law(project):
         folder / "endless.py",
         folder / "leaving.py",
     )
-    marking.write_text(re.sub(r"LIMIT = .*", "LIMIT = 20.0", marking.read_text()))
+    marking.write_text(re.sub(r"LIMIT = .*", "LIMIT = 3.0", marking.read_text()))
     endless.write_text(begun.replace("return 0.0  # your part", "while True: pass"))
     leaving.write_text("import os; os._exit(0)")
     _, out, _ = called(folder, *mark, endless, leaving, submission)
-    assert each_mentions(out, ("endless.py", "0 of 2", "20 s"), ("leaving.py", "0 of 2"), ("no law yet",))
+    assert each_mentions(out, ("endless.py", "0 of 2", "3 s"), ("leaving.py", "0 of 2"), ("no law yet",))
     rows = [line.split(",")[:3] for line in marking.with_name("marks.csv").read_text().splitlines()[1:]]
     assert rows == [[str(one), "0", "fail"] for one in (endless, leaving, submission)]
     task = (folder / "exercises/hold/README.md").read_text()
