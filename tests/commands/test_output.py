@@ -14,6 +14,7 @@ from typing import Any
 import pytest
 
 from tests.command_line import status_of
+from tests.commands.recordings import record_spike, record_step
 from tests.commands.test_batch_commands import SCENARIO, STUDY
 from tests.refusals import mentions
 from yawbench.cli import main
@@ -123,46 +124,35 @@ def test_run_check_and_diff_answer_with_the_documented_fields(answers):
 
 
 @pytest.mark.parametrize(
-    ("command", "file", "runs"), [("study", "study.yaml", 2), ("sweep", "sweep.yaml", 2)]
+    ("command", "arguments"),
+    [
+        ("study", ["study.yaml"]),
+        ("sweep", ["sweep.yaml"]),
+        ("compare", ["half.yaml", "--swap", "controller=controller_off,controller_fuzzy_sideslip"]),
+    ],
 )
-def test_experiments_answer_with_their_records(answers, command, file, runs):
-    made = answers(command, file)
+def test_experiments_answer_with_their_records(answers, command, arguments):
+    made = answers(command, *arguments)
     assert set(made) == ALWAYS | documented()[command]
     (experiment,) = made["experiments"]
-    assert (experiment["runs"], experiment["missing"], experiment["failed"]) == (runs, 0, {})
-    folder = Path(experiment["folder"])
-    written = json.loads((folder / "experiment.json").read_text())
+    assert (experiment["runs"], experiment["missing"], experiment["failed"]) == (2, 0, {})
+    written = json.loads((Path(experiment["folder"]) / "experiment.json").read_text())
     assert experiment["record"].keys() == written.keys()
-    assert [one["verdict"] for one in experiment["record"]["claims"]] == [
-        one["verdict"] for one in written["claims"]
-    ]
+    verdicts = [[one["verdict"] for one in record["claims"]] for record in (experiment["record"], written)]
+    assert verdicts[0] == verdicts[1]
     assert Path(made["page"]).is_file()
 
 
-def test_compare_answers_with_its_runs(answers):
-    made = answers("compare", "half.yaml", "--swap", "controller=controller_off,controller_fuzzy_sideslip")
-    assert set(made) == ALWAYS | documented()["compare"]
-    assert len(made["experiments"][0]["record"]["runs"]) == 2
-
-
 def test_measured_answers_with_flaws(answers, tmp_path):
-    rows = "".join(f"{k / 100},{9.0 if k == 50 else 0.001 * (k % 7)}\n" for k in range(200))
-    (tmp_path / "run.csv").write_text("time [s],r [rad/s]\n" + rows)
-    (tmp_path / "measured.yaml").write_text("files: [run.csv]\nsignals: {yaw_rate: r}\n")
-    made = answers("measured", "show", "measured.yaml", with_fmus=False)
+    record_spike(tmp_path)
+    made = answers("measured", "show", "spike.yaml", with_fmus=False)
     assert set(made) == ALWAYS | documented()["measured"]
     assert [(one["kind"], one["signal"]) for one in made["flaws"]] == [("spikes", "yaw_rate")]
     assert made["status"] == 1
 
 
 def test_evaluate_answers_with_what_evaluation_json_has(answers, tmp_path):
-    rows = "".join(
-        f"{k / 100},{0.5 * (k > 100)},{0.2 * (k > 120)},{4.0 * (k > 130)},25\n" for k in range(500)
-    )
-    header = "time [s],delta [rad],r [rad/s],ay [m/s2],v [m/s]\n"
-    (tmp_path / "step.csv").write_text(header + rows)
-    signals = "steering_wheel_angle: delta, yaw_rate: r, acceleration_y: ay, velocity_x: v"
-    (tmp_path / "step.yaml").write_text(f"files: [step.csv]\nsignals: {{{signals}}}\n")
+    record_step(tmp_path)
     made = answers("evaluate", "step-steer", "step.yaml", "--no-figures", with_fmus=False)
     assert set(made) == ALWAYS | documented()["evaluate"]
     written = json.loads((Path(made["folder"]) / "evaluation.json").read_text())
@@ -224,10 +214,9 @@ def test_notes_are_in_the_object_as_infos_and_warnings(answers):
     assert "value-implausible" in {one["code"] for one in made["diagnostics"]}
 
 
-def test_latex_is_all_that_is_printed_and_compiles_by_its_shape(fmus, tmp_path, monkeypatch, capfd):
+def test_latex_is_all_that_is_printed_and_compiles_by_its_shape(fmus, tmp_path, capfd):
     (tmp_path / "half.yaml").write_text(SCENARIO)
-    monkeypatch.chdir(tmp_path)
-    assert status_of("check", "half.yaml", "--fmus", fmus, "--latex") == 0
+    assert status_of("check", tmp_path / "half.yaml", "--fmus", fmus, "--latex") == 0
     text = capfd.readouterr().out
     tables = text.split("\\end{table}\n")
     assert len(tables) > 3

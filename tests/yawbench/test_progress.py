@@ -84,9 +84,10 @@ PROGRAM = """
 import os, sys
 import yawbench as yb
 from yawbench.foundation import progress as _progress
+base = yb.load("fnn_sideslip/25mps").set({"stop_time": 0.1})
 for delay, switch in ((60.0, ""), (0.0, "off"), (0.0, "")):
     _progress.DELAY, os.environ[_progress.SWITCH] = delay, switch
-    yb.load("fnn_sideslip/25mps").set({"stop_time": 1}).run()
+    base.run()
     print("rich.progress" in sys.modules)
 """
 
