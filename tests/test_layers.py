@@ -122,7 +122,9 @@ def test_folders_beside_the_package_are_imported_as_its_parts_alone():
     folders = "components|foundation|fmus|orchestrator|scenarios|vocabulary"
     whole = re.compile(rf"^ *(?:import|from) (?:{folders})\b.*", re.MULTILINE)
     beside = (f for room in ("tests", "campaigns", "benchmarks", "docs") for f in (ROOT / room).rglob("*.py"))
-    found = {str(path): whole.findall(path.read_text(encoding="utf-8")) for path in (*FILES.values(), *beside)}
+    found = {
+        str(path): whole.findall(path.read_text(encoding="utf-8")) for path in (*FILES.values(), *beside)
+    }
     assert {path: lines for path, lines in found.items() if lines} == {}
 
 

@@ -59,27 +59,17 @@ def cluster_of_threads():
         yield made
 
 
-def table_of(file, yawbench, cluster, tmp_path):  # noqa: F811
-    """Make runs here and on the cluster; compare the tables, and return the words of a second call."""
+@pytest.mark.parametrize("kind", ["threads", pytest.param("processes", marks=pytest.mark.exhaustive)])
+def test_a_cluster_gives_the_table_of_this_machine_to_the_byte(kind, moods, yawbench, tmp_path, request):  # noqa: F811
+    made = request.getfixturevalue("cluster_of_threads" if kind == "threads" else "cluster")
+    file = moods(5, 20, 60, count=2)
     yawbench(file, "here", "--jobs", "2")
-    status, _, err = yawbench(file, "there", "--scheduler", cluster.scheduler_address)
+    status, _, err = yawbench(file, "there", "--scheduler", made.scheduler_address)
     assert status == 1, err  # level 20 fails
     assert ": 6 runs\n" in err
-    assert (tmp_path / "here" / "table.parquet").read_bytes() == (
-        tmp_path / "there" / "table.parquet"
-    ).read_bytes()
-    return yawbench(file, "there", "--scheduler", cluster.scheduler_address)[2]
-
-
-def test_a_cluster_gives_the_table_of_this_machine_to_the_byte(moods, yawbench, cluster_of_threads, tmp_path):  # noqa: F811
-    assert mentions(
-        table_of(moods(5, 20, 60, count=2), yawbench, cluster_of_threads, tmp_path), "all finished already"
-    )
-
-
-@pytest.mark.exhaustive
-def test_so_does_a_cluster_of_processes(moods, yawbench, cluster, tmp_path):  # noqa: F811
-    assert "6 runs, all finished" in table_of(moods(5, 20, 60, count=2), yawbench, cluster, tmp_path)
+    here, there = ((tmp_path / folder / "table.parquet").read_bytes() for folder in ("here", "there"))
+    assert here == there
+    assert "all finished already" in yawbench(file, "there", "--scheduler", made.scheduler_address)[2]
 
 
 def test_runs_travel_in_batches_as_long_as_workers_stay_busy_alike():

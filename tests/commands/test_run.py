@@ -13,6 +13,7 @@ import pytest
 
 from tests.cars import load_scenario, make_plan
 from tests.command_line import status_of
+from tests.commands.terminal import seen_on_terminal
 from tests.fmu_copies import put_fmus
 from tests.refusals import each_mentions, mentions
 from yawbench.fmus.build import build_component
@@ -127,12 +128,8 @@ def test_the_record_tells_everything_needed_to_repeat_the_run(yawbench, fmus, tm
     assert run["status"] == "completed"
     assert run["error"] is None
     assert mentions(run["title"], "car", "slalom")
-    assert (run["algorithm"], run["step_size"], run["stop_time"], run["rows"]) == (
-        "extrapolated",
-        0.001,
-        0.05,
-        51,
-    )
+    settings = [run[name] for name in ("algorithm", "step_size", "stop_time", "rows")]
+    assert settings == ["extrapolated", 0.001, 0.05, 51]
     assert sorted(run["evaluation_order"]) == sorted(run["fmus"])
     assert list(run["units"]) == ["time", *load_results(tmp_path / "out")]
     for fmu in run["fmus"].values():
@@ -223,20 +220,7 @@ def test_a_warning_of_a_component_is_shown_and_recorded(yawbench, faulty, tmp_pa
     assert status == 0
     assert mentions(said.splitlines()[0], "warning", "0.05 s", "90 %")
     run = load_results(tmp_path / "out").record
-    assert each_mentions(
-        [w.text for w in run.warnings],
-        ("90 %", "tyres", "warm"),
-        ("90 %", "tyres", "warm"),
-        ("90 %", "tyres", "warm"),
-        ("90 %", "tyres", "warm"),
-        ("90 %", "tyres", "warm"),
-    )
-
-
-def run_process(*arguments):
-    """Run the command line in a process of its own; its stderr is no terminal."""
-    command = [sys.executable, "-m", "yawbench", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=60)
+    assert each_mentions([w.text for w in run.warnings], *[("90 %", "tyres", "warm")] * 5)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="os.kill ends the process there")
@@ -244,20 +228,13 @@ def run_process(*arguments):
 def test_ctrl_c_ends_a_component_that_never_comes_back(loop, faulty, fmus, tmp_path, monkeypatch):
     monkeypatch.setenv("YAWBENCH_LOOP", loop)
     scenario = faulty("os.kill(os.getppid(), signal.SIGINT)\n            while True: signal.pause()")
-    done = run_process("run", scenario, "--fmus", fmus, "--out", tmp_path / "out")
+    command = [sys.executable, "-m", "yawbench", "run", scenario, "--fmus", fmus, "--out", tmp_path / "out"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60)
     assert done.returncode == 130
     assert each_mentions(done.stderr, ("0.05 s", "interrupted", "controller"), ("out", "recorded"))
     results = load_results(tmp_path / "out")
     assert results.record.status == "interrupted"
     assert results.time[-1] == 0.05
-
-
-def test_output_to_a_pipe_has_no_progress_bar(fmus, tmp_path):
-    done = run_process("run", car(tmp_path, stop=0.5), "--fmus", fmus, "--out", tmp_path / "out")
-    assert done.returncode == 0
-    assert done.stdout == ""
-    assert done.stderr.startswith(f"{tmp_path / 'out'}: 501 rows of ")
-    assert "\x1b" not in done.stderr
 
 
 LEFT = """
@@ -270,44 +247,28 @@ print("numpy" in sys.modules, len(os.listdir("/proc/self/task")))
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="lists the threads of a process")
-def test_a_run_of_native_units_starts_no_threads(fmus, tmp_path):
-    arguments = "run", car(tmp_path, stop=0.1), "--fmus", fmus, "--out", tmp_path / "out"
+def test_a_run_of_native_units_starts_no_threads_and_shows_no_bar_in_a_pipe(fmus, tmp_path):
+    arguments = "run", car(tmp_path, stop=0.5), "--fmus", fmus, "--out", tmp_path / "out"
     command = [sys.executable, "-c", LEFT, *map(str, arguments)]
     environment = {name: value for name, value in os.environ.items() if name != "OPENBLAS_NUM_THREADS"}
     done = subprocess.run(command, capture_output=True, text=True, timeout=60, env=environment)
     assert done.stdout.split() == ["True", "1"], done.stderr
+    assert done.stderr.startswith(f"{tmp_path / 'out'}: 501 rows of ")
+    assert "\x1b" not in done.stderr
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs a pseudo-terminal")
 @pytest.mark.parametrize(("columns", "shown"), [(200, "of the [second] kind"), (60, "A car on a slalom of…")])
 @pytest.mark.sampled(1)
 def test_a_terminal_shows_a_progress_bar_and_keeps_only_the_last_line(columns, shown, fmus, tmp_path):
-    import pty
-
-    leader, follower = pty.openpty()
     scenario = car(tmp_path, stop=2)
     text = scenario.read_text(encoding="utf-8")
     scenario.write_text(text.replace("on a slalom", "on a slalom of the [second] kind"), encoding="utf-8")
-    command = [sys.executable, "-m", "yawbench", "run", scenario, "--fmus", fmus,
-               "--out", tmp_path / "out"]  # fmt: skip
+    command = [sys.executable, "-m", "yawbench", "run", scenario, "--fmus", fmus, "--out", tmp_path / "out"]
     environment = {**os.environ, "TERM": "xterm", "COLUMNS": str(columns)}
-    process = subprocess.Popen([str(c) for c in command], stderr=follower, env=environment)
-    os.close(follower)
-    seen = b""
-    while True:
-        try:
-            part = os.read(leader, 65536)
-        except OSError:
-            break
-        if not part:
-            break
-        seen += part
-    os.close(leader)
-    assert process.wait() == 0
-    assert shown.encode() in seen
-    assert "━".encode() in seen
-    assert b"100%" in seen
-    assert b"2001 rows of " in seen.splitlines()[-1]
+    seen = seen_on_terminal(command, "stderr", env=environment)
+    assert all(part in seen for part in (shown, "━", "100%"))
+    assert "2001 rows of " in seen.splitlines()[-1]
 
 
 def calls_of(action):

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import fcntl
 import os
-import pty
 import re
-import struct
 import subprocess
 import sys
-import termios
 from pathlib import Path
 
 import pytest
 from rich.cells import cell_len
 
+from tests.commands.terminal import seen_on_terminal
 from yawbench.commands import output
 from yawbench.metrics.expressions import MetricValue
 from yawbench.studies import tables
@@ -120,21 +117,8 @@ def columns_of_output(environment: dict[str, str], terminal: tuple[int, int] | N
         return subprocess.run(
             command, env={**known, **environment}, capture_output=True, text=True, check=True, cwd=ROOT
         ).stdout
-    ours, theirs = pty.openpty()
-    fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", *terminal, 0, 0))
-    process = subprocess.Popen(
-        command, env={**known, "TERM": "xterm", **environment}, stdout=theirs, cwd=ROOT
-    )
-    os.close(theirs)
-    read = b""
-    try:
-        while block := os.read(ours, 65536):
-            read += block
-    except OSError:  # the end of a terminal
-        pass
-    os.close(ours)
-    assert process.wait() == 0
-    return re.sub(r"\x1b\[[0-9;]*m", "", read.decode())
+    own = {**known, "TERM": "xterm", **environment}
+    return re.sub(r"\x1b\[[0-9;]*m", "", seen_on_terminal(command, "stdout", terminal, env=own, cwd=ROOT))
 
 
 @pytest.mark.parametrize(

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import json
-import os
-import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
 import yawbench as yb
-from tests.checkout import CODE, ROOT, copy_checkout
+from tests.checkout import CODE, ROOT, copy_checkout, install_apart, run_apart
 from tests.refusals import mentions
 
 pytestmark = pytest.mark.exhaustive
@@ -19,10 +17,7 @@ pytestmark = pytest.mark.exhaustive
 
 def run(*command: str | Path, cwd: Path, **environment: str) -> str:
     """Run a command without this checkout on Python's path; return what it prints."""
-    plain = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
-    done = subprocess.run(
-        command, cwd=cwd, env=plain | environment, capture_output=True, text=True, check=False
-    )
+    done = run_apart(*command, cwd=cwd, **environment)
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
 
@@ -32,18 +27,19 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """An environment with the wheel; its dependencies are those of the environment of the tests."""
     folder = tmp_path_factory.mktemp("wheel")
     checkout = copy_checkout(folder / "checkout")
-    pip = (sys.executable, "-m", "pip", "--disable-pip-version-check")
-    build = (*pip, "wheel", "--quiet", "--no-deps", "--no-build-isolation", "--no-index")
+    build = (
+        sys.executable,
+        "-m",
+        "pip",
+        "wheel",
+        "--quiet",
+        "--no-deps",
+        "--no-build-isolation",
+        "--no-index",
+    )
     run(*build, "--wheel-dir", folder, checkout, cwd=folder)
     (wheel,) = folder.glob("yawbench-*.whl")
-    environment = folder / "environment"
-    run(sys.executable, "-m", "venv", "--without-pip", environment, cwd=folder)
-    (packages,) = environment.glob("lib/python*/site-packages")
-    shared = [path for path in sys.path if path.endswith("site-packages")]
-    (packages / "shared.pth").write_text("\n".join(shared))
-    python = environment / "bin" / "python"
-    run(*pip, "--python", python, "install", "--quiet", "--no-deps", "--no-index", wheel, cwd=folder)
-    return environment
+    return install_apart(wheel, folder / "environment")
 
 
 @pytest.fixture
