@@ -16,6 +16,7 @@ import pytest
 from tests.command_line import status_of
 from tests.commands.recordings import record_spike, record_step
 from tests.commands.test_batch_commands import SCENARIO, STUDY
+from tests.commands.test_run import FAULTY
 from tests.refusals import mentions
 from yawbench.cli import main
 from yawbench.commands import output
@@ -35,25 +36,6 @@ axes:
 metrics:
   moment: {metric: peak(yaw_moment)}
 """
-
-TALKING = '''
-import os
-import sys
-
-from yawbench.components.fmi.component import Component
-
-
-class Talking(Component):
-    """Says that it is there, in Python and behind its back."""
-
-    outputs = ("yaw_moment",)
-
-    def output(self, t, u):
-        print("here I am")
-        sys.stdout.flush()
-        os.write(1, b"and here")
-        return (1.0,)
-'''
 
 
 @pytest.fixture
@@ -179,30 +161,29 @@ def test_errors_are_in_the_object_with_the_same_status(answers, arguments, code,
     assert Diagnostic.of(error).message
 
 
+def controller_that(act: str, folder: Path) -> Path:
+    """Build a controller that does something in every step from 0.05 s on."""
+    source = folder / "controller_faulty.py"
+    source.write_text(FAULTY.format(name="Faulty", act=act, value="1.0"))
+    return build_component(source, folder)
+
+
 def test_a_failed_run_is_an_error_at_a_time_of_an_instance(answers, fmus, tmp_path):
-    law = tmp_path / "controller_law.py"
-    law.write_text(
-        "from yawbench.components.fmi.component import Component\n\n\n"
-        'class Law(Component):\n    """Fails."""\n\n    inputs = ("yaw_rate_ref",)\n'
-        '    outputs = ("yaw_moment",)\n\n    def output(self, t, u):\n        return (1.0 / (t < 0.2),)\n'
-    )
-    fmu = build_component(law, tmp_path)
+    fmu = controller_that("raise ValueError", tmp_path)
     made = answers("run", "half.yaml", "--swap", f"controller={fmu}")
     assert made["status"] == 1
     (error,) = (one for one in made["diagnostics"] if one["severity"] == "error")
     assert error["location"]["instance"] == "controller"
-    assert error["location"]["time"] == pytest.approx(0.19)  # in the step to 0.2 s
+    assert error["location"]["time"] == pytest.approx(0.05)
 
 
-def test_what_fmus_print_goes_to_standard_error(tmp_path):
-    source = tmp_path / "controller_talking.py"
-    source.write_text(TALKING)
-    fmu = build_component(source, tmp_path)
-    file = tmp_path / "scenario.yaml"
-    file.write_text(f"stop_time: 0.02\nstep_size: 0.01\nunits:\n  controller: {{fmu: {fmu}}}\n")
-    command = (sys.executable, "-m", "yawbench", "run", file, "--out", tmp_path / "out", "--json")
-    done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT)
-    assert json.loads(done.stdout)["rows"] == 3
+def test_what_fmus_print_goes_to_standard_error(fmus, tmp_path):
+    fmu = controller_that('print("here I am", flush=True), os.write(1, b"and here")', tmp_path)
+    (tmp_path / "half.yaml").write_text(SCENARIO)
+    command = (sys.executable, "-m", "yawbench", "run", tmp_path / "half.yaml", "--fmus", fmus, "--json")
+    options = ("--swap", f"controller={fmu}", "--out", tmp_path / "out")
+    done = subprocess.run((*command, *options), capture_output=True, text=True, check=True, cwd=ROOT)
+    assert json.loads(done.stdout)["rows"] == 41
     assert "here I am" in done.stderr
     assert "and here" in done.stderr
 
