@@ -209,18 +209,6 @@ def test_latex_is_all_that_is_printed_and_compiles_by_its_shape(fmus, tmp_path, 
         assert {len(re.split(r"(?<!\\)&", row)) for row in rows} == {columns}
 
 
-def test_a_limit_whose_runs_are_missing_is_unknown(answers, tmp_path):
-    limits = "limits: {top: {says: Highest speed, of: speed, holds_if: [{metric: moment, below: 1e9}]}}\n"
-    (tmp_path / "sweep.yaml").write_text(SWEEP + limits)
-    made = answers("sweep", "sweep.yaml", "--out", "out")
-    assert made["tables"][-1]["rows"] == [["20.0", "-"]]
-    (tmp_path / "sweep.yaml").write_text(SWEEP.replace("[10, 20]", "[10, 20, 30]") + limits)
-    made = answers("sweep", "sweep.yaml", "--out", "out", "--no-run")
-    assert made["tables"][-1]["rows"] == [["20.0", "unknown (30.0 not made)"]]
-    (limit,) = made["experiments"][0]["record"]["limits"]["top"]
-    assert (limit["up_to"], limit["not_at"], limit["why"]) == (20.0, None, "not made")
-
-
 def test_a_command_that_takes_long_to_open_fmus_says_so(monkeypatch, capsys):
     before = threading.active_count()
     monkeypatch.setattr(output, "PATIENCE", 0.01)

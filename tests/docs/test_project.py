@@ -29,12 +29,6 @@ def test_project_changelog_and_citation_name_one_version_and_its_date():
     assert PROJECT["project"]["version"] == CITATION["version"]
 
 
-def test_the_citation_has_what_its_format_requires():
-    assert {"cff-version", "message", "title", "authors"} <= CITATION.keys()
-    assert CITATION["cff-version"] == "1.2.0"
-    assert CITATION["license"] == PROJECT["project"]["license"]
-
-
 def test_the_architecture_links_the_page_of_every_room():
     assert {page for page in pages() if f"({page})" not in ARCHITECTURE} == set()
 

@@ -5,13 +5,11 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
-import subprocess
 import sys
 
 import pytest
 
 import yawbench as yb
-from tests.refusals import mentions
 from yawbench.components.controllers.off import Off
 from yawbench.foundation.errors import Interrupted, YawbenchError
 
@@ -114,30 +112,3 @@ def test_an_experiment_runs_in_a_daemonic_process(how):
     assert reading.recv() == ["completed", "completed"]
     process.join()
     assert process.exitcode == 0
-
-
-LOOP = """
-import os, signal
-import yawbench as yb
-base = yb.load("fnn_sideslip/25mps").set({"stop_time": 0.02})
-made = 0
-def pressed(yaw_rate, t):
-    if made == 1 and t > 0.01:
-        os.kill(os.getpid(), signal.SIGINT)
-    return 0.0
-while True:
-    try:
-        base.swap(controller=pressed).run()
-    except yb.YawbenchError:
-        continue
-    finally:
-        made += 1
-        print(made, flush=True)
-"""
-
-
-def test_ctrl_c_ends_a_loop_that_goes_on_after_every_error():
-    done = subprocess.run([sys.executable, "-c", LOOP], capture_output=True, text=True, check=False)
-    assert done.stdout.split() == ["1", "2"]
-    assert done.returncode != 0
-    assert mentions(done.stderr, "interrupted", "Interrupted")

@@ -163,28 +163,20 @@ def test_programs_of_one_name_in_two_instances_are_two(base):
     assert (run["controller.yaw_moment"][-1], run["driver.steer_angle"][-1]) == (7.0, 0.01)
 
 
-def test_two_objects_of_a_class_are_ranked_by_their_names(tmp_path):
+class Slow(Law):
+    step_size = 0.1
+
+
+def test_objects_of_a_class_are_ranked_by_their_names_with_their_sampling_times(tmp_path):
     out = tmp_path / "ranking"
-    both = {"weak": Law(1e3), "strong": Law(1e5)}
-    places = yb.rank(both, against=["none"], conditions=["hard"], quick=True, out=out)
+    laws = {"weak": Law(1e3), "strong": Law(1e5), "slow": Slow(1e5)}
+    places = yb.rank(laws, against=["none"], conditions=["hard"], quick=True, out=out)
     headroom = places.cells.set_index("entry")["headroom"]
-    assert set(headroom.index) == {"weak", "strong", "none"}
-    assert headroom.nunique() == 3
+    assert set(headroom.index) == {*laws, "none"}
+    assert headroom.nunique() == 4
+    runs = yb.open(out).runs.values()
+    assert {run.results.record.fmus["controller"].step_size for run in runs} >= {0.1, 0.005}
     other = yb.rank({"weak": Law(1e5)}, against=[], conditions=["hard"], quick=True, out=out)
     assert other.cells["headroom"].tolist() == [headroom["strong"]]  # not the kept run of the first one
     with refused(yb.ScenarioError, "argument-invalid", names=("name", "mapping")):
-        yb.rank(both, name="both", against=[], conditions=["hard"], quick=True)
-
-
-def test_the_sampling_time_of_an_object_holds_in_a_ranking(tmp_path):
-    class Slow(Law):
-        step_size = 0.1
-
-    places = yb.rank(
-        {"slow": Slow(1e5), "fast": Law(1e5)}, against=[], conditions=["hard"], quick=True, out=tmp_path
-    )
-    headroom = places.cells.set_index("entry")["headroom"]
-    assert headroom["slow"] != headroom["fast"]
-    runs = yb.open(tmp_path).runs.values()
-    sampled = {run.results.record.fmus["controller"].step_size for run in runs}
-    assert sampled == {0.1, 0.005}
+        yb.rank(laws, name="both", against=[], conditions=["hard"], quick=True)
