@@ -31,31 +31,24 @@ def cluster_module():
     return cluster
 
 
-@pytest.fixture(scope="module")
-def cluster():
-    """A scheduler and two workers, each a process."""
+def _of_two(**options):
+    """A scheduler and two workers."""
     import distributed
 
-    with distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0", silence_logs=50
-    ) as made:
+    return distributed.LocalCluster(n_workers=2, threads_per_worker=1, silence_logs=50, **options)
+
+
+@pytest.fixture(scope="module")
+def cluster():
+    """Workers that are processes."""
+    with _of_two(processes=True, dashboard_address=":0") as made:
         yield made
 
 
 @pytest.fixture(scope="module")
 def cluster_of_threads():
-    """A scheduler and two workers in this process, which talk over the network all the same."""
-    import distributed
-
-    with distributed.LocalCluster(
-        n_workers=2,
-        threads_per_worker=1,
-        processes=False,
-        protocol="tcp",
-        host="127.0.0.1",
-        dashboard_address=None,
-        silence_logs=50,
-    ) as made:
+    """Workers in this process, which talk over the network all the same."""
+    with _of_two(processes=False, protocol="tcp", host="127.0.0.1", dashboard_address=None) as made:
         yield made
 
 
@@ -152,10 +145,8 @@ def test_a_run_that_kills_its_process_leaves_the_workers_alone(moods, yawbench, 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs signals")
 @pytest.mark.exhaustive
-def test_a_worker_that_is_killed_costs_no_run(moods, fmus, cluster, tmp_path):  # noqa: F811
+def test_a_worker_that_is_killed_costs_no_run(moods, fmus, cluster, cluster_module, tmp_path):  # noqa: F811
     from distributed import Client
-
-    from yawbench.cluster.cluster import run_on_cluster
 
     experiment = load_experiment(moods(1, 2, 3, 4, 5, 6))
     planned = plan_experiment(experiment, tmp_path, fmus=fmus, keep=False)
@@ -169,7 +160,7 @@ def test_a_worker_that_is_killed_costs_no_run(moods, fmus, cluster, tmp_path):  
         told.append(outcome)
 
     left, _ = left_to_do(planned.jobs, {})
-    run_on_cluster(left, done, scheduler=cluster.scheduler_address)
+    cluster_module.run_on_cluster(left, done, scheduler=cluster.scheduler_address)
     assert sorted(outcome.job.key for outcome in told) == sorted(job.key for job in left)
     assert all(outcome.ok for outcome in told)
 
