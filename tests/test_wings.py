@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from tests.checkout import ROOT, copy_checkout, run_in
+from tests.checkout import copy_checkout, run_in
 from tests.commands.test_batch_commands import SCENARIO, STUDY
 from tests.refusals import refused
 from yawbench.foundation import plugins
 from yawbench.foundation.errors import ScenarioError
-from yawbench.parts import IMPORTED, PARTS
+from yawbench.parts import IMPORTED
 from yawbench.parts import WINGS as REGISTERED
 
 WINGS = [*REGISTERED, *IMPORTED]
@@ -77,13 +77,6 @@ def test_without_one_wing_the_rest_works_and_the_tests_of_the_core_pass(wing, tm
     works(checkout, "fuzzy_pid/study")
     done = run_in(checkout, "python", "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", *CORE)
     assert done.returncode == 0, done.stdout[-3000:]
-
-
-def test_what_is_listed_is_there():
-    assert all(
-        (ROOT / part.replace("yawbench.", "yawbench/") / "__init__.py").is_file()
-        for part in (*PARTS, *IMPORTED)
-    )
 
 
 def test_what_a_missing_part_makes_is_refused_in_a_sentence():

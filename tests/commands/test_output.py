@@ -17,7 +17,6 @@ from tests.command_line import status_of
 from tests.commands.recordings import record_spike, record_step
 from tests.commands.test_batch_commands import SCENARIO, STUDY
 from tests.commands.test_run import FAULTY
-from tests.refusals import mentions
 from yawbench.cli import main
 from yawbench.commands import output
 from yawbench.fmus.build import build_component
@@ -220,9 +219,3 @@ def test_a_command_that_takes_long_to_open_fmus_says_so(monkeypatch, capsys):
         pass
     assert capsys.readouterr().err == ""
     assert threading.active_count() == before
-
-
-def test_a_quantity_of_the_car_without_its_word_is_told_with_it(capsys):
-    for setting, meant in (("mass=1200", "vehicle.mass=1200"), ("frction=0.3", "friction")):
-        assert status_of("run", "fnn_sideslip/25mps", "--set", setting) == 2
-        assert mentions(capsys.readouterr().err, f"--set {setting}", meant)

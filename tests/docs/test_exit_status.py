@@ -112,11 +112,5 @@ def test_a_run_that_fails_is_an_error_of_the_report_and_what_was_not_judged_is_s
     assert root.find(".//error").get("message") == "not completed: division by zero"
 
 
-def test_an_interrupted_command_ends_with_130_and_the_page_has_no_other_statuses(monkeypatch):
-    monkeypatch.setattr("yawbench.commands.list.list", _interrupted)
-    assert status_of("list") == 130
+def test_the_page_has_no_statuses_but_those_of_commands_and_signals():
     assert set(statuses()) == {0, 1, 2, 130, 143}
-
-
-def _interrupted() -> None:
-    raise KeyboardInterrupt

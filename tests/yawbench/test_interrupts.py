@@ -45,14 +45,6 @@ def hanging(yaw_rate, t):
         pass
 
 
-class Object:
-    inputs = ("yaw_rate",)
-    outputs = ("yaw_moment",)
-
-    def output(self, t, u):
-        raise SystemExit(5)
-
-
 class Class(Off):
     def output(self, t, u):
         raise KeyboardInterrupt
@@ -63,7 +55,6 @@ class Class(Off):
     [
         (raising(KeyboardInterrupt()), KeyboardInterrupt),
         (raising(SystemExit(5)), SystemExit),
-        (Object(), SystemExit),
         (Class, KeyboardInterrupt),
         (pressed, Interrupted),
         (hanging, Interrupted),

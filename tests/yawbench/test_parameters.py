@@ -10,7 +10,7 @@ import pytest
 
 import yawbench as yb
 from tests.refusals import refused
-from tests.yawbench.laws import Data, Derived, Law, powers
+from tests.yawbench.laws import Data, Law, powers
 
 
 @pytest.fixture(scope="module")
@@ -113,14 +113,6 @@ def test_an_object_that_was_changed_after_it_was_made_has_no_parameters(base):
     with refused(yb.WiringError, "parameter-unknown", names=("controller.gain=1.0", "Law", "'gain'")):
         base.swap(controller=changed).set({"controller.gain": 1.0}).plan()
     assert np.array_equal(moments(base.swap(controller=changed)), moments(base.swap(controller=Law(10.0))))
-
-
-def test_an_attribute_of_the_class_that_an_object_has_otherwise_counts_in_what_is_derived(base):
-    own = Derived()
-    assert np.array_equal(
-        moments(base.swap(controller=own).set({"controller.gain": 3e4})),
-        moments(base.swap(controller=Law(3e4))),
-    )
 
 
 def test_values_outside_the_declared_ones_are_refused(base):
