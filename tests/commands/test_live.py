@@ -10,7 +10,6 @@ import pytest
 from tests.commands.test_batch_commands import SCENARIO
 from tests.refusals import mentions
 from yawbench.commands.live import Live, braille
-from yawbench.events.kinds import RunWatch
 from yawbench.orchestrator.results.reader import load_results
 from yawbench.planner import Planner
 
@@ -87,7 +86,7 @@ def test_a_picture_has_the_extremes_of_its_curves(fmus, tmp_path):
     (tmp_path / "half.yaml").write_text(SCENARIO)
     planner = Planner()
     plan = planner.plan(planner.load(tmp_path / "half.yaml"), fmus=fmus)
-    live = Live(plan, RunWatch(plan), terminal=True)
+    live = Live(plan, terminal=True)
     rows = np.zeros((41, 1 + len(plan.record)))
     rows[:, 0] = np.linspace(0.0, 0.4, 41)
     rows[:, 1:] = np.sin(rows[:, :1])
