@@ -45,3 +45,22 @@ def run_in(folder: Path, *command: str | Path, **environment: str) -> subprocess
         text=True,
         check=False,
     )
+
+
+def install_apart(wheel: Path, environment: Path) -> Path:
+    """Install a wheel in an environment of its own, with the dependencies of the one in use; return it."""
+    made = run_apart(sys.executable, "-m", "venv", "--without-pip", environment, cwd=wheel.parent)
+    (packages,) = environment.glob("lib/python*/site-packages")
+    (packages / "shared.pth").write_text("\n".join(p for p in sys.path if p.endswith("site-packages")))
+    pip = (sys.executable, "-m", "pip", "--disable-pip-version-check", "--python", environment / "bin/python")
+    done = run_apart(*pip, "install", "--quiet", "--no-deps", "--no-index", wheel, cwd=wheel.parent)
+    assert made.returncode == done.returncode == 0, made.stderr + done.stderr
+    return environment
+
+
+def run_apart(*command: str | Path, cwd: Path, **environment: str) -> subprocess.CompletedProcess[str]:
+    """Run a command without a checkout on Python's path."""
+    plain = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
+    return subprocess.run(
+        command, cwd=cwd, env=plain | environment, capture_output=True, text=True, check=False
+    )

@@ -116,18 +116,7 @@ def test_a_coupling_algorithm_is_one_entry(steered, monkeypatch):
     results = simulate_in_memory(plan, opener=Stage(units))
     assert results["target.y"][1:] == pytest.approx(results.time[1:] - 1 / 16)
     assert steered.set({"algorithm": "averaged"}).plan().algorithm == "averaged"
-    with refused(
-        ScenarioError,
-        "value-invalid",
-        names=(
-            "algorithm=average",
-            "'jacobi'",
-            "'gauss_seidel'",
-            "'extrapolated'",
-            "'averaged'",
-            "'average'",
-        ),
-    ):
+    with refused(ScenarioError, "value-invalid", names=("algorithm=average", "'averaged'", "'average'")):
         steered.set({"algorithm": "average"})
 
 

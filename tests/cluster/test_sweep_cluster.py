@@ -31,55 +31,38 @@ def cluster_module():
     return cluster
 
 
-@pytest.fixture(scope="module")
-def cluster():
-    """A scheduler and two workers, each a process."""
+def _of_two(**options):
+    """A scheduler and two workers."""
     import distributed
 
-    with distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0", silence_logs=50
-    ) as made:
+    return distributed.LocalCluster(n_workers=2, threads_per_worker=1, silence_logs=50, **options)
+
+
+@pytest.fixture(scope="module")
+def cluster():
+    """Workers that are processes."""
+    with _of_two(processes=True, dashboard_address=":0") as made:
         yield made
 
 
 @pytest.fixture(scope="module")
 def cluster_of_threads():
-    """A scheduler and two workers in this process, which talk over the network all the same."""
-    import distributed
-
-    with distributed.LocalCluster(
-        n_workers=2,
-        threads_per_worker=1,
-        processes=False,
-        protocol="tcp",
-        host="127.0.0.1",
-        dashboard_address=None,
-        silence_logs=50,
-    ) as made:
+    """Workers in this process, which talk over the network all the same."""
+    with _of_two(processes=False, protocol="tcp", host="127.0.0.1", dashboard_address=None) as made:
         yield made
 
 
-def table_of(file, yawbench, cluster, tmp_path):  # noqa: F811
-    """Make runs here and on the cluster; compare the tables, and return the words of a second call."""
+@pytest.mark.parametrize("kind", ["threads", pytest.param("processes", marks=pytest.mark.exhaustive)])
+def test_a_cluster_gives_the_table_of_this_machine_to_the_byte(kind, moods, yawbench, tmp_path, request):  # noqa: F811
+    made = request.getfixturevalue("cluster_of_threads" if kind == "threads" else "cluster")
+    file = moods(5, 20, 60, count=2)
     yawbench(file, "here", "--jobs", "2")
-    status, _, err = yawbench(file, "there", "--scheduler", cluster.scheduler_address)
+    status, _, err = yawbench(file, "there", "--scheduler", made.scheduler_address)
     assert status == 1, err  # level 20 fails
     assert ": 6 runs\n" in err
-    assert (tmp_path / "here" / "table.parquet").read_bytes() == (
-        tmp_path / "there" / "table.parquet"
-    ).read_bytes()
-    return yawbench(file, "there", "--scheduler", cluster.scheduler_address)[2]
-
-
-def test_a_cluster_gives_the_table_of_this_machine_to_the_byte(moods, yawbench, cluster_of_threads, tmp_path):  # noqa: F811
-    assert mentions(
-        table_of(moods(5, 20, 60, count=2), yawbench, cluster_of_threads, tmp_path), "all finished already"
-    )
-
-
-@pytest.mark.exhaustive
-def test_so_does_a_cluster_of_processes(moods, yawbench, cluster, tmp_path):  # noqa: F811
-    assert "6 runs, all finished" in table_of(moods(5, 20, 60, count=2), yawbench, cluster, tmp_path)
+    here, there = ((tmp_path / folder / "table.parquet").read_bytes() for folder in ("here", "there"))
+    assert here == there
+    assert "all finished already" in yawbench(file, "there", "--scheduler", made.scheduler_address)[2]
 
 
 def test_runs_travel_in_batches_as_long_as_workers_stay_busy_alike():
@@ -162,10 +145,8 @@ def test_a_run_that_kills_its_process_leaves_the_workers_alone(moods, yawbench, 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs signals")
 @pytest.mark.exhaustive
-def test_a_worker_that_is_killed_costs_no_run(moods, fmus, cluster, tmp_path):  # noqa: F811
+def test_a_worker_that_is_killed_costs_no_run(moods, fmus, cluster, cluster_module, tmp_path):  # noqa: F811
     from distributed import Client
-
-    from yawbench.cluster.cluster import run_on_cluster
 
     experiment = load_experiment(moods(1, 2, 3, 4, 5, 6))
     planned = plan_experiment(experiment, tmp_path, fmus=fmus, keep=False)
@@ -179,7 +160,7 @@ def test_a_worker_that_is_killed_costs_no_run(moods, fmus, cluster, tmp_path):  
         told.append(outcome)
 
     left, _ = left_to_do(planned.jobs, {})
-    run_on_cluster(left, done, scheduler=cluster.scheduler_address)
+    cluster_module.run_on_cluster(left, done, scheduler=cluster.scheduler_address)
     assert sorted(outcome.job.key for outcome in told) == sorted(job.key for job in left)
     assert all(outcome.ok for outcome in told)
 

@@ -105,16 +105,8 @@ def test_converge_halves_the_step_and_reports_order_and_cost(yawbench, folder):
     rows = list(csv.DictReader((folder / "o/converge.csv").open()))
     assert float(rows[0]["order [1]"]) == pytest.approx(1.0, abs=0.1)  # jacobi is one step late
     assert float(rows[0]["wall_time [s]"]) > 0
-    assert mentions(
-        (folder / "o/report.html").read_text(),
-        "half.yaml",
-        "--halvings",
-        "2",
-        "--signal",
-        "reference.yaw_rate_ref",
-        "--algorithm",
-        "gauss_seidel",
-    )
+    repeating = ("half.yaml", "--halvings", "2", "--signal", "reference.yaw_rate_ref", "gauss_seidel")
+    assert mentions((folder / "o/report.html").read_text(), *repeating)
     header = (folder / "o/jacobi/5ms/results.csv").read_text().splitlines()[0]
     assert header == "time,reference.yaw_rate_ref"  # the signal alone
 
@@ -142,32 +134,27 @@ def test_study_makes_again_only_what_has_not_been_made_of_the_same_scenario(yawb
     assert "finished already" not in yawbench("study", "study.yaml", "--out", "o", "--fresh")[2]
 
 
-def test_study_judges_what_is_there_without_running(yawbench, folder):
-    yawbench("study", "study.yaml", "--out", "o")
-    before = (folder / "o/off/run.json").read_bytes()
+def test_study_without_running_judges_what_is_there_and_tells_what_is_of_another_run(yawbench, folder):
+    def judged(*options):
+        status, out, said = yawbench("study", "study.yaml", "--out", "o", *options)
+        return status, "not judged" in out, "out of date" in said, said
+
+    assert judged()[:3] == (0, False, False)
+    record = folder / "o/off/run.json"
+    before = record.read_bytes()
     (folder / "o/report.html").unlink()
-    status, out, _ = yawbench("study", "study.yaml", "--out", "o", "--no-run")
-    assert status == 0
-    assert (folder / "o/report.html").is_file()
-    assert (folder / "o/off/run.json").read_bytes() == before
-    (folder / "o/off/run.json").unlink()
-    status, out, _ = yawbench("study", "study.yaml", "--out", "o", "--no-run")
-    assert status == 1
-    assert "not judged" in out
-
-
-def test_study_without_running_tells_which_results_are_of_another_run(yawbench, folder):
-    assert "out of date" not in yawbench("study", "study.yaml", "--out", "o")[2]
-    assert "out of date" not in yawbench("study", "study.yaml", "--out", "o", "--no-run")[2]
     scenario = folder / "half.yaml"
-    scenario.write_text(scenario.read_text() + "# the same\n")
-    assert "out of date" not in yawbench("study", "study.yaml", "--out", "o", "--no-run")[2]
+    scenario.write_text(SCENARIO + "# the same\n")
+    assert judged("--no-run")[:3] == (0, False, False)
+    assert (folder / "o/report.html").is_file()
     scenario.write_text(SCENARIO.replace("stop_time: ", "stop_time: 1"))
-    status, _, said = yawbench("study", "study.yaml", "--out", "o", "--no-run")
-    assert status == 0
-    assert mentions(said, "off", "date", "stop")
+    *ended, said = judged("--no-run")
+    assert ended == [0, False, True] and mentions(said, "off", "date", "stop")
+    assert record.read_bytes() == before
     scenario.unlink()
-    assert yawbench("study", "study.yaml", "--out", "o", "--no-run")[0] == 0
+    assert judged("--no-run")[:2] == (0, False)
+    record.unlink()
+    assert judged("--no-run")[:2] == (1, True)
 
 
 def test_study_finds_a_wrong_scenario_before_anything_runs(yawbench, folder):
@@ -195,31 +182,20 @@ WRITERS = {
 }
 
 
-@pytest.fixture
-def held(folder):
-    """The lock on a folder that another is writing."""
-    (folder / "sweep.yaml").write_text(SWEEP)
-    return FolderLock(folder / "o")
-
-
 @pytest.mark.sampled(2)
 @pytest.mark.skipif(sys.platform == "win32", reason="folders cannot be locked")
 @pytest.mark.parametrize("command", WRITERS)
-def test_a_command_leaves_a_folder_alone_that_another_is_writing(command, yawbench, folder, held):
+def test_a_command_leaves_a_folder_alone_while_another_is_writing_and_leaves_it_in_turn(
+    command, yawbench, folder
+):
+    (folder / "sweep.yaml").write_text(SWEEP)
+    held = FolderLock(folder / "o")
     before = sorted((folder / "o").iterdir())
     status, out, said = yawbench(command, *WRITERS[command], "--out", "o")
     assert (status, out) == (2, "")
     assert mentions(said, "o:", f"(process {os.getpid()}")
     assert mentions(said.splitlines()[-1], "--out", "wait")
     assert sorted((folder / "o").iterdir()) == before
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="folders cannot be locked")
-@pytest.mark.parametrize("command", WRITERS)
-@pytest.mark.sampled(2)
-def test_a_command_takes_a_folder_that_another_has_left_and_leaves_it_in_turn(
-    command, yawbench, folder, held
-):
     held.release()
     assert yawbench(command, *WRITERS[command], "--out", "o")[0] == 0
     assert not list((folder / "o").rglob(LOCK_FILE))
@@ -270,27 +246,18 @@ def test_plot_runs_a_scenario_whose_results_are_missing_or_of_another_controller
 
 
 def test_plot_says_what_is_wrong(yawbench, folder):
-    status, _, said = yawbench("plot", "nowhere")
-    assert status == 2
-    assert each_mentions(said, ("run.json", "'yawbench run SCENARIO --out nowhere'"))
     yawbench("run", "half.yaml", "--out", "o/off")
-    status, _, said = yawbench("plot", "o/off/results.csv")
-    assert status == 2
-    assert each_mentions(said, ("o/off/results.csv", "folder", "results"))
-    status, _, said = yawbench("plot", "o/off", "--set", "driver.amplitude=0.01")
-    assert status == 2
-    assert each_mentions(said, ("--swap", "--set", "--fault"))
-    status, _, said = yawbench("plot", "half.yaml", "--swap", "brake=controller_off")
-    assert status == 2
-    assert each_mentions(
-        said, ("--swap brake=controller_off", "'brake'", "driver", "reference", "controller")
-    )
-    status, _, said = yawbench("plot", "o/off", "--panel", "roll_angle")
-    assert status == 2
-    assert each_mentions(said, ("--panel roll_angle", "'steer_angle'"))
-    status, _, said = yawbench("plot", "o/off", "--label", "a", "--label", "b")
-    assert status == 2
-    assert each_mentions(said, ("--label", "2 labels, 1 folder", "folder"))
+    for arguments, *names in (
+        (["nowhere"], "run.json", "'yawbench run SCENARIO --out nowhere'"),
+        (["o/off/results.csv"], "o/off/results.csv", "folder", "results"),
+        (["o/off", "--set", "driver.amplitude=0.01"], "--swap", "--set", "--fault"),
+        (["half.yaml", "--swap", "brake=controller_off"], "--swap brake=controller_off", "'brake'", "driver"),
+        (["o/off", "--panel", "roll_angle"], "--panel roll_angle", "'steer_angle'"),
+        (["o/off", "--label", "a", "--label", "b"], "--label", "2 labels, 1 folder", "folder"),
+    ):
+        status, _, said = yawbench("plot", *arguments)
+        assert status == 2
+        assert each_mentions(said, tuple(names))
 
 
 @pytest.mark.parametrize(

@@ -56,11 +56,8 @@ def test_the_peak_of_a_listed_run_is_that_while_it_moved(tmp_path):
     for name, run in (("stops", stops), ("spun", spun)):
         write(run, tmp_path / name, **ends(run))
     moving = stops["plant.velocity_x"] >= LEAST_SPEED
-    rows = [
-        dict(zip(table.headings, row, strict=True))
-        for table in [runs_table(found_runs(tmp_path))]
-        for row in table.rows
-    ]
+    table = runs_table(found_runs(tmp_path))
+    rows = [dict(zip(table.headings, row, strict=True)) for row in table.rows]
     peaks = {Path(row["run"]).name: row["max|β|"].number for row in rows}
     assert peaks["stops"] == pytest.approx(np.max(np.abs(slip[moving]))) and peaks["stops"] < 1.0
     assert peaks["spun"] == pytest.approx(2.5)

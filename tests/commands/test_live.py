@@ -7,24 +7,13 @@ import time
 import numpy as np
 import pytest
 
+from tests.commands.test_batch_commands import SCENARIO
 from tests.refusals import mentions
 from yawbench.commands.live import Live, braille
-from yawbench.events.kinds import RunWatch
 from yawbench.orchestrator.results.reader import load_results
 from yawbench.planner import Planner
 
 UNITS = ("driver_sine", "reference_steady_state", "controller_fuzzy_sideslip")
-
-SCENARIO = """
-title: Half a car
-stop_time: 0.5
-step_size: 0.01
-inputs: {velocity_x: 20, friction: 0.7, sideslip: 0.001, sideslip_rate: 0}
-units:
-  driver:     {fmu: driver_sine, parameters: {frequency: 2, start_time: 0, amplitude: 0.03}}
-  reference:  {fmu: reference_steady_state}
-  controller: {fmu: controller_fuzzy_sideslip}
-"""
 
 
 @pytest.fixture
@@ -45,7 +34,7 @@ def test_a_paced_run_takes_its_time_and_computes_the_same(run):
     began = time.monotonic()
     status, _, paced = run("paced", "--realtime", "0.5")
     assert status == 0
-    assert time.monotonic() - began >= 1.0
+    assert time.monotonic() - began >= 0.8
     assert (free / "results.csv").read_bytes() == (paced / "results.csv").read_bytes()
 
 
@@ -53,7 +42,7 @@ def test_without_a_terminal_a_live_run_says_its_values(run):
     status, told, folder = run("live", "--live")
     assert status == 0
     last = load_results(folder)["driver.steer_angle"][-1]
-    assert mentions(told, "t = 0.50 s", f"(driver.steer_angle) {np.degrees(last):.4g} °")
+    assert mentions(told, "t = 0.40 s", f"(driver.steer_angle) {np.degrees(last):.4g} °")
 
 
 def test_record_keeps_the_columns_that_it_names(run):
@@ -97,11 +86,11 @@ def test_a_picture_has_the_extremes_of_its_curves(fmus, tmp_path):
     (tmp_path / "half.yaml").write_text(SCENARIO)
     planner = Planner()
     plan = planner.plan(planner.load(tmp_path / "half.yaml"), fmus=fmus)
-    live = Live(plan, RunWatch(plan), terminal=True)
-    rows = np.zeros((51, 1 + len(plan.record)))
-    rows[:, 0] = np.linspace(0.0, 0.5, 51)
+    live = Live(plan, terminal=True)
+    rows = np.zeros((41, 1 + len(plan.record)))
+    rows[:, 0] = np.linspace(0.0, 0.4, 41)
     rows[:, 1:] = np.sin(rows[:, :1])
     live.look(rows)
     text = str(live._picture())
-    assert mentions(text, "t = 0.50 of 0.5 s")
-    assert mentions(text, "driver.steer_angle", f"{np.degrees(np.sin(0.5)):.4g} °")
+    assert mentions(text, "t = 0.40 of 0.4 s")
+    assert mentions(text, "driver.steer_angle", f"{np.degrees(np.sin(0.4)):.4g} °")

@@ -100,67 +100,48 @@ def test_an_exercise_is_failed_as_it_begins_and_passed_with_a_law(project):
         marks = (folder / "exercises/hold/marks.csv").read_text().splitlines()[1].split(",")
         results.append((done[1][0], [check["holds"] for check in record["checks"]], done[3][0], marks[2]))
     assert results == [(1, [False, True, False], 1, "fail"), (0, [True, True, True], 0, "pass")]
-    submission = folder / "broken.py"
-    submission.write_text("raise RuntimeError('no law yet')")
-    status, out, _ = called(folder, *mark, submission)
-    assert status == 1 and mentions(out, "broken.py", "0 of 2", "no law yet")
-    marking, endless, leaving = (
-        folder / "exercises/hold/mark.py",
-        folder / "endless.py",
-        folder / "leaving.py",
+    marking = folder / "exercises/hold/mark.py"
+    marking.write_text(re.sub(r"LIMIT = .*", "LIMIT = 3.0", marking.read_text()))
+    asleep = begun.replace("return 0.0  # your part", "__import__('time').sleep(60)")
+    submitted = {"endless": asleep, "leaving": "import os; os._exit(0)", "broken": "raise RuntimeError('no')"}
+    for name, text in submitted.items():
+        (folder / f"{name}.py").write_text(text)
+    status, out, _ = called(folder, *mark, *(f"{name}.py" for name in submitted))
+    ends = (
+        ("endless.py", "0 of 2", "3 s"),
+        ("leaving.py", "0 of 2"),
+        ("broken.py", "0 of 2", "RuntimeError: no"),
     )
-    marking.write_text(re.sub(r"LIMIT = .*", "LIMIT = 20.0", marking.read_text()))
-    endless.write_text(begun.replace("return 0.0  # your part", "while True: pass"))
-    leaving.write_text("import os; os._exit(0)")
-    _, out, _ = called(folder, *mark, endless, leaving, submission)
-    assert each_mentions(out, ("endless.py", "0 of 2", "20 s"), ("leaving.py", "0 of 2"), ("no law yet",))
+    assert status == 1 and each_mentions(out, *ends)
     rows = [line.split(",")[:3] for line in marking.with_name("marks.csv").read_text().splitlines()[1:]]
-    assert rows == [[str(one), "0", "fail"] for one in (endless, leaving, submission)]
+    assert rows == [[f"{name}.py", "0", "fail"] for name in submitted]
     task = (folder / "exercises/hold/README.md").read_text()
     assert all(shlex.join(["yawbench", *command[1:]]) in task for command in (units, build))
 
 
-@pytest.fixture(scope="module")
-def beginnings(project):
-    """The same folder with one beginning of every other kind, taken as far as a run."""
+OTHERS = {
+    "driver": "driver_sine", "reference": "reference_steady_state", "tyre": "tyre_dugoff",
+    "plant": "plant_seven_dof", "road": "road_patchwork",
+}  # fmt: skip
+
+
+@pytest.mark.exhaustive
+def test_what_begins_of_any_kind_is_built_tested_run_and_judged(project):
     folder, _ = project
-    made = {}
-    for kind in ("driver", "reference", "tyre", "plant", "road", "vehicle", "scenario", "study", "sweep"):
+    for kind in (*OTHERS, "vehicle", "scenario", "study", "sweep"):
         done = run_in(folder, "yawbench", "new", kind, f"my_{kind}")
         assert done.returncode == 0, done.stderr
         _, *commands = [shlex.split(line) for line in done.stdout.splitlines()]
         for command in (c for c in commands if c[1] != "compare"):
             done = run_in(folder, *command)
             assert done.returncode == 0, done.stdout + done.stderr
-        made[kind] = done.stdout, commands[-1]
-    return folder, made
-
-
-@pytest.mark.parametrize(
-    ("role", "other"),
-    [
-        ("driver", "driver_sine"),
-        ("reference", "reference_steady_state"),
-        ("tyre", "tyre_dugoff"),
-        ("plant", "plant_seven_dof"),
-        ("road", "road_patchwork"),
-    ],
-)
-@pytest.mark.exhaustive
-def test_a_unit_of_any_role_is_built_tested_and_run(beginnings, role, other):
-    folder, made = beginnings
-    run = load_results(folder / "results" / f"my_{role}" / "25mps")
-    assert run.record.fmus[role].name == f"{role}_my_{role}"
-    assert np.abs(run.find("yaw_rate")).max() > 0.01
-    _, last = made[role]
-    assert last[1:2] + last[-1:] == ["compare", f"{role}={other},{role}_my_{role}"]
-
-
-@pytest.mark.exhaustive
-def test_a_new_study_judges_its_claim_and_a_new_sweep_finds_its_limits(beginnings):
-    _, made = beginnings
-    assert "holds" in made["study"][0]
-    assert "neural network" in made["sweep"][0]
+        assert {"study": "holds", "sweep": "neural network"}.get(kind, "") in done.stdout
+        if kind in OTHERS:
+            run = load_results(folder / "results" / f"my_{kind}" / "25mps")
+            assert run.record.fmus[kind].name == f"{kind}_my_{kind}"
+            assert np.abs(run.find("yaw_rate")).max() > 0.01
+            last = commands[-1]
+            assert last[1:2] + last[-1:] == ["compare", f"{kind}={OTHERS[kind]},{kind}_my_{kind}"]
 
 
 def test_only_controllers_begin_in_c(new):
@@ -169,16 +150,19 @@ def test_only_controllers_begin_in_c(new):
     assert each_mentions(said, ("--language c", "available"))
 
 
-def test_it_writes_a_source_a_test_and_a_scenario(tmp_path, new):
-    new("idea")
-    written = {"controllers/idea.py", "tests/test_idea.py", "scenarios/idea/25mps.yaml"}
-    assert files(tmp_path) == written | {"scenarios/schemas/scenario.json"}
-
-
-def test_in_c_the_source_is_a_folder_with_the_model_description(tmp_path, new):
-    new("idea", "--language", "c")
-    expected = {"controllers/idea/idea.c", "controllers/idea/modelDescription.xml"}
-    expected |= {"tests/test_idea.py", "scenarios/idea/25mps.yaml", "scenarios/schemas/scenario.json"}
+@pytest.mark.parametrize(
+    ("language", "source"),
+    [("python", {"idea.py"}), ("c", {"idea/idea.c", "idea/modelDescription.xml"})],
+)
+def test_a_controller_has_a_source_a_test_and_a_scenario_and_neither_language_overwrites(
+    language, source, tmp_path, new
+):
+    new("idea", "--language", language)
+    expected = {"tests/test_idea.py", "scenarios/idea/25mps.yaml", "scenarios/schemas/scenario.json"}
+    expected |= {f"controllers/{name}" for name in source}
+    assert files(tmp_path) == expected
+    status, _, said = new("idea", "--language", "c" if language == "python" else "python")
+    assert status == 2 and "tests/test_idea.py" in said
     assert files(tmp_path) == expected
 
 
@@ -239,13 +223,6 @@ def test_nothing_is_overwritten_and_nothing_is_written_beside_what_exists(tmp_pa
     assert each_mentions(said, ("scenarios/idea/25mps.yaml", "exists"))
     assert files(tmp_path) == {"scenarios/idea/25mps.yaml"}
     assert scenario.read_text() == "mine"
-
-
-def test_the_other_language_does_not_overwrite_either(tmp_path, new):
-    new("idea", "--language", "c")
-    status, _, said = new("idea")
-    assert status == 2
-    assert "tests/test_idea.py" in said
 
 
 @pytest.mark.parametrize(

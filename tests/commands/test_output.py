@@ -14,8 +14,9 @@ from typing import Any
 import pytest
 
 from tests.command_line import status_of
+from tests.commands.recordings import record_spike, record_step
 from tests.commands.test_batch_commands import SCENARIO, STUDY
-from tests.refusals import mentions
+from tests.commands.test_run import FAULTY
 from yawbench.cli import main
 from yawbench.commands import output
 from yawbench.fmus.build import build_component
@@ -34,25 +35,6 @@ axes:
 metrics:
   moment: {metric: peak(yaw_moment)}
 """
-
-TALKING = '''
-import os
-import sys
-
-from yawbench.components.fmi.component import Component
-
-
-class Talking(Component):
-    """Says that it is there, in Python and behind its back."""
-
-    outputs = ("yaw_moment",)
-
-    def output(self, t, u):
-        print("here I am")
-        sys.stdout.flush()
-        os.write(1, b"and here")
-        return (1.0,)
-'''
 
 
 @pytest.fixture
@@ -123,46 +105,35 @@ def test_run_check_and_diff_answer_with_the_documented_fields(answers):
 
 
 @pytest.mark.parametrize(
-    ("command", "file", "runs"), [("study", "study.yaml", 2), ("sweep", "sweep.yaml", 2)]
+    ("command", "arguments"),
+    [
+        ("study", ["study.yaml"]),
+        ("sweep", ["sweep.yaml"]),
+        ("compare", ["half.yaml", "--swap", "controller=controller_off,controller_fuzzy_sideslip"]),
+    ],
 )
-def test_experiments_answer_with_their_records(answers, command, file, runs):
-    made = answers(command, file)
+def test_experiments_answer_with_their_records(answers, command, arguments):
+    made = answers(command, *arguments)
     assert set(made) == ALWAYS | documented()[command]
     (experiment,) = made["experiments"]
-    assert (experiment["runs"], experiment["missing"], experiment["failed"]) == (runs, 0, {})
-    folder = Path(experiment["folder"])
-    written = json.loads((folder / "experiment.json").read_text())
+    assert (experiment["runs"], experiment["missing"], experiment["failed"]) == (2, 0, {})
+    written = json.loads((Path(experiment["folder"]) / "experiment.json").read_text())
     assert experiment["record"].keys() == written.keys()
-    assert [one["verdict"] for one in experiment["record"]["claims"]] == [
-        one["verdict"] for one in written["claims"]
-    ]
+    verdicts = [[one["verdict"] for one in record["claims"]] for record in (experiment["record"], written)]
+    assert verdicts[0] == verdicts[1]
     assert Path(made["page"]).is_file()
 
 
-def test_compare_answers_with_its_runs(answers):
-    made = answers("compare", "half.yaml", "--swap", "controller=controller_off,controller_fuzzy_sideslip")
-    assert set(made) == ALWAYS | documented()["compare"]
-    assert len(made["experiments"][0]["record"]["runs"]) == 2
-
-
 def test_measured_answers_with_flaws(answers, tmp_path):
-    rows = "".join(f"{k / 100},{9.0 if k == 50 else 0.001 * (k % 7)}\n" for k in range(200))
-    (tmp_path / "run.csv").write_text("time [s],r [rad/s]\n" + rows)
-    (tmp_path / "measured.yaml").write_text("files: [run.csv]\nsignals: {yaw_rate: r}\n")
-    made = answers("measured", "show", "measured.yaml", with_fmus=False)
+    record_spike(tmp_path)
+    made = answers("measured", "show", "spike.yaml", with_fmus=False)
     assert set(made) == ALWAYS | documented()["measured"]
     assert [(one["kind"], one["signal"]) for one in made["flaws"]] == [("spikes", "yaw_rate")]
     assert made["status"] == 1
 
 
 def test_evaluate_answers_with_what_evaluation_json_has(answers, tmp_path):
-    rows = "".join(
-        f"{k / 100},{0.5 * (k > 100)},{0.2 * (k > 120)},{4.0 * (k > 130)},25\n" for k in range(500)
-    )
-    header = "time [s],delta [rad],r [rad/s],ay [m/s2],v [m/s]\n"
-    (tmp_path / "step.csv").write_text(header + rows)
-    signals = "steering_wheel_angle: delta, yaw_rate: r, acceleration_y: ay, velocity_x: v"
-    (tmp_path / "step.yaml").write_text(f"files: [step.csv]\nsignals: {{{signals}}}\n")
+    record_step(tmp_path)
     made = answers("evaluate", "step-steer", "step.yaml", "--no-figures", with_fmus=False)
     assert set(made) == ALWAYS | documented()["evaluate"]
     written = json.loads((Path(made["folder"]) / "evaluation.json").read_text())
@@ -189,30 +160,29 @@ def test_errors_are_in_the_object_with_the_same_status(answers, arguments, code,
     assert Diagnostic.of(error).message
 
 
+def controller_that(act: str, folder: Path) -> Path:
+    """Build a controller that does something in every step from 0.05 s on."""
+    source = folder / "controller_faulty.py"
+    source.write_text(FAULTY.format(name="Faulty", act=act, value="1.0"))
+    return build_component(source, folder)
+
+
 def test_a_failed_run_is_an_error_at_a_time_of_an_instance(answers, fmus, tmp_path):
-    law = tmp_path / "controller_law.py"
-    law.write_text(
-        "from yawbench.components.fmi.component import Component\n\n\n"
-        'class Law(Component):\n    """Fails."""\n\n    inputs = ("yaw_rate_ref",)\n'
-        '    outputs = ("yaw_moment",)\n\n    def output(self, t, u):\n        return (1.0 / (t < 0.2),)\n'
-    )
-    fmu = build_component(law, tmp_path)
+    fmu = controller_that("raise ValueError", tmp_path)
     made = answers("run", "half.yaml", "--swap", f"controller={fmu}")
     assert made["status"] == 1
     (error,) = (one for one in made["diagnostics"] if one["severity"] == "error")
     assert error["location"]["instance"] == "controller"
-    assert error["location"]["time"] == pytest.approx(0.19)  # in the step to 0.2 s
+    assert error["location"]["time"] == pytest.approx(0.05)
 
 
-def test_what_fmus_print_goes_to_standard_error(tmp_path):
-    source = tmp_path / "controller_talking.py"
-    source.write_text(TALKING)
-    fmu = build_component(source, tmp_path)
-    file = tmp_path / "scenario.yaml"
-    file.write_text(f"stop_time: 0.02\nstep_size: 0.01\nunits:\n  controller: {{fmu: {fmu}}}\n")
-    command = (sys.executable, "-m", "yawbench", "run", file, "--out", tmp_path / "out", "--json")
-    done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT)
-    assert json.loads(done.stdout)["rows"] == 3
+def test_what_fmus_print_goes_to_standard_error(fmus, tmp_path):
+    fmu = controller_that('print("here I am", flush=True), os.write(1, b"and here")', tmp_path)
+    (tmp_path / "half.yaml").write_text(SCENARIO)
+    command = (sys.executable, "-m", "yawbench", "run", tmp_path / "half.yaml", "--fmus", fmus, "--json")
+    options = ("--swap", f"controller={fmu}", "--out", tmp_path / "out")
+    done = subprocess.run((*command, *options), capture_output=True, text=True, check=True, cwd=ROOT)
+    assert json.loads(done.stdout)["rows"] == 41
     assert "here I am" in done.stderr
     assert "and here" in done.stderr
 
@@ -224,10 +194,9 @@ def test_notes_are_in_the_object_as_infos_and_warnings(answers):
     assert "value-implausible" in {one["code"] for one in made["diagnostics"]}
 
 
-def test_latex_is_all_that_is_printed_and_compiles_by_its_shape(fmus, tmp_path, monkeypatch, capfd):
+def test_latex_is_all_that_is_printed_and_compiles_by_its_shape(fmus, tmp_path, capfd):
     (tmp_path / "half.yaml").write_text(SCENARIO)
-    monkeypatch.chdir(tmp_path)
-    assert status_of("check", "half.yaml", "--fmus", fmus, "--latex") == 0
+    assert status_of("check", tmp_path / "half.yaml", "--fmus", fmus, "--latex") == 0
     text = capfd.readouterr().out
     tables = text.split("\\end{table}\n")
     assert len(tables) > 3
@@ -237,18 +206,6 @@ def test_latex_is_all_that_is_printed_and_compiles_by_its_shape(fmus, tmp_path, 
         rows = [line for line in table.splitlines() if line.endswith("\\\\")]
         assert len(rows) > 1
         assert {len(re.split(r"(?<!\\)&", row)) for row in rows} == {columns}
-
-
-def test_a_limit_whose_runs_are_missing_is_unknown(answers, tmp_path):
-    limits = "limits: {top: {says: Highest speed, of: speed, holds_if: [{metric: moment, below: 1e9}]}}\n"
-    (tmp_path / "sweep.yaml").write_text(SWEEP + limits)
-    made = answers("sweep", "sweep.yaml", "--out", "out")
-    assert made["tables"][-1]["rows"] == [["20.0", "-"]]
-    (tmp_path / "sweep.yaml").write_text(SWEEP.replace("[10, 20]", "[10, 20, 30]") + limits)
-    made = answers("sweep", "sweep.yaml", "--out", "out", "--no-run")
-    assert made["tables"][-1]["rows"] == [["20.0", "unknown (30.0 not made)"]]
-    (limit,) = made["experiments"][0]["record"]["limits"]["top"]
-    assert (limit["up_to"], limit["not_at"], limit["why"]) == (20.0, None, "not made")
 
 
 def test_a_command_that_takes_long_to_open_fmus_says_so(monkeypatch, capsys):
@@ -262,9 +219,3 @@ def test_a_command_that_takes_long_to_open_fmus_says_so(monkeypatch, capsys):
         pass
     assert capsys.readouterr().err == ""
     assert threading.active_count() == before
-
-
-def test_a_quantity_of_the_car_without_its_word_is_told_with_it(capsys):
-    for setting, meant in (("mass=1200", "vehicle.mass=1200"), ("frction=0.3", "friction")):
-        assert status_of("run", "fnn_sideslip/25mps", "--set", setting) == 2
-        assert mentions(capsys.readouterr().err, f"--set {setting}", meant)

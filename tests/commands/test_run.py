@@ -3,7 +3,6 @@
 import gc
 import hashlib
 import json
-import multiprocessing
 import os
 import subprocess
 import sys
@@ -13,6 +12,7 @@ import pytest
 
 from tests.cars import load_scenario, make_plan
 from tests.command_line import status_of
+from tests.commands.terminal import seen_on_terminal
 from tests.fmu_copies import put_fmus
 from tests.refusals import each_mentions, mentions
 from yawbench.fmus.build import build_component
@@ -127,12 +127,8 @@ def test_the_record_tells_everything_needed_to_repeat_the_run(yawbench, fmus, tm
     assert run["status"] == "completed"
     assert run["error"] is None
     assert mentions(run["title"], "car", "slalom")
-    assert (run["algorithm"], run["step_size"], run["stop_time"], run["rows"]) == (
-        "extrapolated",
-        0.001,
-        0.05,
-        51,
-    )
+    settings = [run[name] for name in ("algorithm", "step_size", "stop_time", "rows")]
+    assert settings == ["extrapolated", 0.001, 0.05, 51]
     assert sorted(run["evaluation_order"]) == sorted(run["fmus"])
     assert list(run["units"]) == ["time", *load_results(tmp_path / "out")]
     for fmu in run["fmus"].values():
@@ -223,20 +219,7 @@ def test_a_warning_of_a_component_is_shown_and_recorded(yawbench, faulty, tmp_pa
     assert status == 0
     assert mentions(said.splitlines()[0], "warning", "0.05 s", "90 %")
     run = load_results(tmp_path / "out").record
-    assert each_mentions(
-        [w.text for w in run.warnings],
-        ("90 %", "tyres", "warm"),
-        ("90 %", "tyres", "warm"),
-        ("90 %", "tyres", "warm"),
-        ("90 %", "tyres", "warm"),
-        ("90 %", "tyres", "warm"),
-    )
-
-
-def run_process(*arguments):
-    """Run the command line in a process of its own; its stderr is no terminal."""
-    command = [sys.executable, "-m", "yawbench", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=60)
+    assert each_mentions([w.text for w in run.warnings], *[("90 %", "tyres", "warm")] * 5)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="os.kill ends the process there")
@@ -244,20 +227,13 @@ def run_process(*arguments):
 def test_ctrl_c_ends_a_component_that_never_comes_back(loop, faulty, fmus, tmp_path, monkeypatch):
     monkeypatch.setenv("YAWBENCH_LOOP", loop)
     scenario = faulty("os.kill(os.getppid(), signal.SIGINT)\n            while True: signal.pause()")
-    done = run_process("run", scenario, "--fmus", fmus, "--out", tmp_path / "out")
+    command = [sys.executable, "-m", "yawbench", "run", scenario, "--fmus", fmus, "--out", tmp_path / "out"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60)
     assert done.returncode == 130
     assert each_mentions(done.stderr, ("0.05 s", "interrupted", "controller"), ("out", "recorded"))
     results = load_results(tmp_path / "out")
     assert results.record.status == "interrupted"
     assert results.time[-1] == 0.05
-
-
-def test_output_to_a_pipe_has_no_progress_bar(fmus, tmp_path):
-    done = run_process("run", car(tmp_path, stop=0.5), "--fmus", fmus, "--out", tmp_path / "out")
-    assert done.returncode == 0
-    assert done.stdout == ""
-    assert done.stderr.startswith(f"{tmp_path / 'out'}: 501 rows of ")
-    assert "\x1b" not in done.stderr
 
 
 LEFT = """
@@ -270,117 +246,56 @@ print("numpy" in sys.modules, len(os.listdir("/proc/self/task")))
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="lists the threads of a process")
-def test_a_run_of_native_units_starts_no_threads(fmus, tmp_path):
-    arguments = "run", car(tmp_path, stop=0.1), "--fmus", fmus, "--out", tmp_path / "out"
+def test_a_run_of_native_units_starts_no_threads_and_shows_no_bar_in_a_pipe(fmus, tmp_path):
+    arguments = "run", car(tmp_path, stop=0.5), "--fmus", fmus, "--out", tmp_path / "out"
     command = [sys.executable, "-c", LEFT, *map(str, arguments)]
     environment = {name: value for name, value in os.environ.items() if name != "OPENBLAS_NUM_THREADS"}
     done = subprocess.run(command, capture_output=True, text=True, timeout=60, env=environment)
     assert done.stdout.split() == ["True", "1"], done.stderr
+    assert done.stderr.startswith(f"{tmp_path / 'out'}: 501 rows of ")
+    assert "\x1b" not in done.stderr
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs a pseudo-terminal")
 @pytest.mark.parametrize(("columns", "shown"), [(200, "of the [second] kind"), (60, "A car on a slalom of…")])
 @pytest.mark.sampled(1)
 def test_a_terminal_shows_a_progress_bar_and_keeps_only_the_last_line(columns, shown, fmus, tmp_path):
-    import pty
-
-    leader, follower = pty.openpty()
     scenario = car(tmp_path, stop=2)
     text = scenario.read_text(encoding="utf-8")
     scenario.write_text(text.replace("on a slalom", "on a slalom of the [second] kind"), encoding="utf-8")
-    command = [sys.executable, "-m", "yawbench", "run", scenario, "--fmus", fmus,
-               "--out", tmp_path / "out"]  # fmt: skip
+    command = [sys.executable, "-m", "yawbench", "run", scenario, "--fmus", fmus, "--out", tmp_path / "out"]
     environment = {**os.environ, "TERM": "xterm", "COLUMNS": str(columns)}
-    process = subprocess.Popen([str(c) for c in command], stderr=follower, env=environment)
-    os.close(follower)
-    seen = b""
-    while True:
-        try:
-            part = os.read(leader, 65536)
-        except OSError:
-            break
-        if not part:
-            break
-        seen += part
-    os.close(leader)
-    assert process.wait() == 0
-    assert shown.encode() in seen
-    assert "━".encode() in seen
-    assert b"100%" in seen
-    assert b"2001 rows of " in seen.splitlines()[-1]
+    seen = seen_on_terminal(command, "stderr", env=environment)
+    assert all(part in seen for part in (shown, "━", "100%"))
+    assert "2001 rows of " in seen.splitlines()[-1]
 
 
-def calls_of(action):
-    """Return how many Python functions are called in an action: its work, whatever the clock says."""
-    count = 0
-
-    def profile(frame, event, argument):
-        nonlocal count
-        count += event == "call"
-
-    sys.setprofile(profile)
-    try:
-        action()
-    finally:
-        sys.setprofile(None)
-    return count
-
-
-def live_components():
-    """Return how many instances of components there are in this process."""
+def left_behind():
+    """Return what a run could leave behind: instances, all objects, listeners, files, mapped libraries."""
     gc.collect()
-    return sum(any(c.__name__ == "Component" for c in type(o).__mro__) for o in gc.get_objects())
-
-
-def state():
-    """Return what a run could leave behind: instances, listeners, modules, open files, mapped libraries."""
+    objects = gc.get_objects()
+    instances = sum(any(c.__name__ == "Component" for c in type(o).__mro__) for o in objects)
     mapped = sum(".so" in line for line in Path("/proc/self/maps").read_text().splitlines())
-    open_files = len(os.listdir("/proc/self/fd"))
-    return live_components(), len(log._listeners), len(sys.path), len(sys.modules), open_files, mapped
+    places = len(log._listeners), len(sys.path), len(sys.modules), len(os.listdir("/proc/self/fd"))
+    return len(objects), (instances, mapped, *places)
 
 
-def resident():
-    """Return the memory this process occupies [bytes]."""
-    return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
-
-
-def repeat_runs(scenario, fmus, out):
-    """Run a scenario 300 times; return states, work and memory after run 50 and after the last."""
-    plan = make_plan(load_scenario(scenario), fmus=fmus)
-
-    def run():
-        simulate(plan, out)
-
-    def look():
-        return state(), calls_of(run), resident()
-
-    untouched = live_components(), len(log._listeners)
-    for _ in range(50):
-        run()
-    early = look()
-    for _ in range(250):
-        run()
-    return untouched, early, look(), len(plan.instances)
-
-
-@pytest.mark.exhaustive
 @pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
-def test_300_runs_in_one_process_neither_leak_nor_take_more_work(fmus, tmp_path, monkeypatch):
+def test_runs_in_one_process_leave_nothing_behind(fmus, tmp_path, monkeypatch):
     monkeypatch.setenv("YAWBENCH_UNITS", "python")
-    scenario = car(tmp_path, stop=0.004)
-    slave = open_instance(make_plan(load_scenario(scenario), fmus=fmus).instances[0], log.Log(), set())
-    alive = live_components()
+    plan = make_plan(load_scenario(car(tmp_path, stop=0.004)), fmus=fmus)
+    slave = open_instance(plan.instances[0], log.Log(), set())
+    _, (alive, *_) = left_behind()
     slave.free()
-    assert live_components() == alive - 1  # so instances are counted
-
-    # A process of its own: what other tests left behind would move its memory by megabytes.
-    with multiprocessing.get_context("spawn").Pool(1) as fresh:
-        untouched, early, late, units = fresh.apply(repeat_runs, (scenario, fmus, tmp_path / "out"))
-    assert early[0][:2] == untouched
-    assert late[0] == early[0]
-    assert late[1] <= early[1]
-    # PythonFMU's library itself loses 1.3 kB per instance, measured over 500 runs.
-    assert late[2] - early[2] < 2.6e3 * 250 * units
+    _, (freed, *_) = left_behind()
+    assert freed == alive - 1  # so instances are counted
+    seen = []
+    for _ in range(3):
+        for _ in range(8):
+            simulate(plan, tmp_path / "out")
+        seen.append(left_behind())
+    assert seen[0][1] == seen[2][1]
+    assert seen[2][0] - seen[1][0] <= 8 * len(plan.instances)  # PythonFMU's library loses an object of each
 
 
 def test_what_was_remarkable_in_a_run_that_failed_is_said_before_why_it_failed(faulty, yawbench, tmp_path):

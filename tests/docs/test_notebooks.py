@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
-import os
 import re
-import subprocess
-import sys
+import runpy
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -57,31 +53,10 @@ def test_a_notebook_runs_to_its_end_and_shows_what_it_draws(file, tmp_path, monk
     assert not [output for output in outputs if output.get("name") == "stderr"]
 
 
-def sliders() -> Any:
-    """Return the notebook with sliders, imported as a module."""
-    spec = importlib.util.spec_from_file_location("sliders", FOLDER / "sliders.py")
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-@pytest.mark.exhaustive
-def test_the_notebook_with_sliders_runs_as_a_program(tmp_path):
-    done = subprocess.run(
-        [sys.executable, FOLDER / "sliders.py"],
-        cwd=tmp_path,
-        env=os.environ | {"PYTHONPATH": str(ROOT), "MPLBACKEND": "agg"},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-
-
 @pytest.mark.exhaustive
 def test_what_the_sliders_say_is_what_is_run():
-    outputs, names = sliders().app.run()
+    names = runpy.run_path(str(FOLDER / "sliders.py"))
+    outputs, names = names["app"].run()
     runs = names["runs"]
     assert runs["no control"].metric("peak(sideslip)") > 2 * runs["controller_fnn"].metric("peak(sideslip)")
     assert runs["no control"]["plant.velocity_x"][0] == names["speed"].value

@@ -29,24 +29,6 @@ def test_project_changelog_and_citation_name_one_version_and_its_date():
     assert PROJECT["project"]["version"] == CITATION["version"]
 
 
-def test_the_citation_has_what_its_format_requires():
-    assert {"cff-version", "message", "title", "authors"} <= CITATION.keys()
-    assert CITATION["cff-version"] == "1.2.0"
-    assert CITATION["license"] == PROJECT["project"]["license"]
-
-
-@pytest.mark.parametrize("text", [CONTRIBUTING, ARCHITECTURE], ids=["CONTRIBUTING", "architecture"])
-def test_files_that_the_guides_of_contributors_name_exist(text):
-    named = re.findall(
-        r"`((?:components|foundation|fmus|vocabulary|orchestrator|scenarios|tests|docs|yawbench)/[\w/]+\.?\w*)",
-        text,
-    )
-    named += re.findall(r"\]\((docs/[\w/.]+\.md)", text)
-    written = [path for path in named if "NAME" not in path]
-    assert len(written) > 8
-    assert [path for path in written if not (ROOT / path).exists()] == []
-
-
 def test_the_architecture_links_the_page_of_every_room():
     assert {page for page in pages() if f"({page})" not in ARCHITECTURE} == set()
 

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import hashlib
-import os
 import subprocess
-import sys
 import zipfile
 from pathlib import Path
 
 import pytest
 
+from tests.checkout import install_apart, run_apart
 from tests.commands.test_batch_commands import SCENARIO, STUDY
 from tests.refusals import mentions
 from yawbench.fmus.packing import DESCRIPTION
@@ -89,27 +88,18 @@ def test_an_archive_that_is_no_zip_is_refused(project, yawbench, fmus):
 
 @pytest.mark.exhaustive
 def test_without_a_checkout_one_command_gives_the_same_bytes(unpacked, tmp_path):
-    def run(*command: object, **environment: str) -> subprocess.CompletedProcess[str]:
-        plain = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
-        own = {"YAWBENCH_CACHE": str(tmp_path / "cache")}
-        return subprocess.run(
-            [*map(str, command)], cwd=unpacked, env=plain | own | environment, capture_output=True, text=True
-        )
-
-    environment = tmp_path / "environment"
-    assert run(sys.executable, "-m", "venv", "--without-pip", environment).returncode == 0
-    (packages,) = environment.glob("lib/python*/site-packages")
-    (packages / "shared.pth").write_text("\n".join(p for p in sys.path if p.endswith("site-packages")))
     (program,) = unpacked.glob("*.whl")
-    pip = (sys.executable, "-m", "pip", "--python", environment / "bin" / "python")
-    done = run(*pip, "install", "--quiet", "--no-deps", "--no-index", program)
-    assert done.returncode == 0, done.stderr
-    yawbench = {"YAWBENCH": str(environment / "bin" / "yawbench")}
-    done = run("sh", "repeat.sh", **yawbench)
+    yawbench = install_apart(program, tmp_path / "environment") / "bin" / "yawbench"
+
+    def repeated() -> subprocess.CompletedProcess[str]:
+        own = {"YAWBENCH_CACHE": str(tmp_path / "cache"), "YAWBENCH": str(yawbench)}
+        return run_apart("sh", "repeat.sh", cwd=unpacked, **own)
+
+    done = repeated()
     assert done.returncode == 0, done.stdout + done.stderr
     assert mentions(done.stderr, "identical", "2 verdicts") and "same bytes" in done.stdout
     for name in ("table.csv", "table.parquet", "verdicts.csv", "off/results.csv"):
         assert (unpacked / "repeated" / name).read_bytes() == (unpacked / "results" / name).read_bytes()
     (unpacked / "results" / "off" / "results.csv").write_text("time\n0\n")
-    done = run("sh", "repeat.sh", **yawbench)
+    done = repeated()
     assert done.returncode != 0 and mentions(done.stdout + done.stderr, "off/results.csv")

@@ -8,9 +8,8 @@ import os
 import subprocess
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass
 from importlib import import_module
-from typing import Any, Literal
+from typing import Any
 
 import fmpy
 import numpy as np
@@ -18,6 +17,7 @@ import pytest
 
 import yawbench as yb
 from tests.refusals import refused
+from tests.yawbench.laws import Data, Derived, half, powers
 from yawbench.components.controllers.fnn import Fnn
 
 GAIN = 3e4
@@ -26,7 +26,6 @@ MODULES = {
     "__init__": "import numpy\n",
     "laws": """
 import sys
-from dataclasses import dataclass
 
 import ourlab.limits as within
 from ourlab.limits import cut
@@ -78,16 +77,8 @@ def ourlab(tmp_path_factory) -> Iterator[Any]:
         del sys.modules[name]
 
 
-def half(x):
-    return 0.5 * x
-
-
 def law(yaw_rate_ref, yaw_rate, t, gain=20000, share=0.5):
     return half(GAIN + gain) * share * (yaw_rate_ref - yaw_rate) if t > 0.1 else 0
-
-
-def powers(yaw_rate, count=3):
-    return sum(10.0**k for k in range(count))
 
 
 def times(factor):
@@ -95,42 +86,6 @@ def times(factor):
         return factor * half(yaw_rate)
 
     return made
-
-
-@dataclass
-class Data:
-    """A law of the yaw rate."""
-
-    inputs = ("yaw_rate_ref", "yaw_rate")
-    outputs = ("yaw_moment",)
-    gain: float = yb.parameter(2e4, "N.m.s/rad", "Moment per yaw-rate error", minimum=0.0)
-    kind: Literal["whole", "half"] = "whole"
-
-    def __post_init__(self):
-        self.half = half(self.gain)
-
-    def start(self, t, u):
-        self.integral = 0.0
-
-    def advance(self, t, h, u):
-        self.integral += h * (u.yaw_rate_ref - u.yaw_rate)
-
-    def output(self, t, u):
-        gain = 2 * self.half if self.kind == "whole" else self.half
-        return gain * (u.yaw_rate_ref - u.yaw_rate) + 1e3 * self.integral
-
-
-class Derived:
-    """Controller whose constructor derives a value from an attribute of the class."""
-
-    inputs, outputs = ("yaw_rate",), ("yaw_moment",)
-    gain = 1e4
-
-    def __init__(self):
-        self.twice = 2 * self.gain
-
-    def output(self, t, u):
-        return -self.twice * u.yaw_rate
 
 
 class Changed(Derived):

@@ -9,53 +9,7 @@ from pyarrow import parquet
 
 import yawbench as yb
 from tests.command_line import status_of
-from yawbench.studies.result_files import columns_of, write_findings
-
-
-@pytest.fixture(scope="module")
-def made():
-    base = yb.load("fnn_sideslip/25mps").set({"stop_time": 1.2})
-    axes = {"driver.amplitude": [0.02, 0.03]}
-    return yb.experiment(base, axes, metrics=["peak(sideslip)"]).run(workers=1)
-
-
-@pytest.fixture(scope="module")
-def folder(made, tmp_path_factory):
-    """A folder as a sweep writes it: tables, and the results of every run."""
-    out = tmp_path_factory.mktemp("sweep")
-    write_findings(made._findings, {}, out)
-    for k, run in enumerate(made.runs):
-        run.save(out / "runs" / str(k))
-    return out
-
-
-def test_the_table_is_that_of_the_experiment_with_its_units(made, folder):
-    table = yb.open(folder).table
-    assert list(table.columns) == columns_of(made._findings).headings
-    assert table["peak(sideslip)"].tolist() == made.table["peak(sideslip)"].tolist()
-    assert table.attrs["units"]["peak(sideslip)"] == made.table.attrs["units"]["peak(sideslip)"]
-
-
-def test_the_runs_are_known_by_their_folders(made, folder):
-    runs = yb.open(folder).runs
-    assert list(runs) == ["runs/0", "runs/1"]
-    assert np.array_equal(runs["runs/1"]["plant.yaw_rate"], made.runs[1]["plant.yaw_rate"])
-
-
-def test_the_folder_of_a_run_is_a_run(folder):
-    assert isinstance(yb.open(folder / "runs" / "0"), yb.Run)
-
-
-def test_runs_without_a_table_are_opened_and_an_empty_folder_is_refused(folder, tmp_path):
-    recorded = yb.open(folder / "runs")
-    assert len(recorded.runs) == 2
-    with pytest.raises(yb.ResultsError) as caught:
-        recorded.table  # noqa: B018
-    assert caught.value.code == "results-missing"
-    with pytest.raises(yb.ResultsError) as caught:
-        yb.open(tmp_path)
-    assert caught.value.code == "results-missing"
-
+from tests.refusals import refused
 
 SCENARIO = Path(yb.__file__).parents[1] / "scenarios/fnn_sideslip/25mps.yaml"
 FILES = {
@@ -74,18 +28,6 @@ runs:
   - {{name: free, scenario: {SCENARIO}, swap: {{controller: controller_off}}, set: {{stop_time: 1.2}}}}
   - {{name: held, scenario: {SCENARIO}, set: {{stop_time: 1.2}}}}
 metrics: {{sideslip: {{metric: peak(sideslip)}}}}
-""",
-    "tune": f"""
-title: Tuning
-metrics: {{error: {{metric: rms_error(yaw_rate)}}}}
-derived: {{cost: {{says: Error, expression: e, unit: rad/s, of: {{e: {{run: mine, metric: error}}}}}}}}
-runs: [{{name: mine, scenario: {SCENARIO}, set: {{stop_time: 1.2}}}}]
-tuning:
-  objective: cost
-  population: 5
-  generations: 1
-  seed: 1
-  laws: {{FNN: {{axes: {{amplitude: {{vary: driver.amplitude, from: 0.01, to: 0.03}}}}}}}}
 """,
 }
 
@@ -125,6 +67,16 @@ def test_a_folder_of_a_sweep_has_its_runs_over_the_axes(swept):
     assert len(axes.get_lines()) >= 4
 
 
+def test_runs_without_a_table_are_opened_and_so_is_one_of_them(swept, tmp_path):
+    recorded = yb.open(swept.folder / "runs")
+    assert len(recorded.runs) == 4
+    assert all(isinstance(yb.open(swept.folder / "runs" / name), yb.Run) for name in recorded.runs)
+    with refused(yb.ResultsError, "results-missing"):
+        recorded.table  # noqa: B018
+    with refused(yb.ResultsError, "results-missing"):
+        yb.open(tmp_path)
+
+
 def test_parquet_and_csv_have_the_same_columns_and_units(swept):
     (table, file) = swept.table, parquet.read_table(swept.folder / "table.parquet")
     assert list(table.columns) == file.schema.names
@@ -150,12 +102,9 @@ def test_a_folder_of_a_run_and_of_its_evaluation(tmp_path):
     assert row["verdict"] == row["stability"] == evaluation.criteria["stability"].status.value
     assert row["displacement"] == evaluation.quantities["displacement"].value
     assert judged.table.attrs["units"]["displacement"] == "m"
-    with pytest.raises(yb.ResultsError) as caught:
-        judged.to_xarray()
-    assert caught.value.code == "results-missing"
-    with pytest.raises(yb.ResultsError) as caught:
-        judged.plot()
-    assert caught.value.code == "results-missing"
+    for missing in (judged.to_xarray, judged.plot):
+        with refused(yb.ResultsError, "results-missing"):
+            missing()
 
 
 def test_a_measurement_file_is_opened_as_a_recording(tmp_path):

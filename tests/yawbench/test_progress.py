@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import io
 import os
-import pty
 import subprocess
 import sys
 import threading
+from typing import Any
 
 import pytest
 from rich.console import Console
 
 import yawbench as yb
 from tests.checkout import ROOT
+from tests.commands.terminal import seen_on_terminal
 from yawbench.foundation import progress as _progress
 
 
@@ -84,29 +85,20 @@ PROGRAM = """
 import os, sys
 import yawbench as yb
 from yawbench.foundation import progress as _progress
+base = yb.load("fnn_sideslip/25mps").set({"stop_time": 0.1})
 for delay, switch in ((60.0, ""), (0.0, "off"), (0.0, "")):
     _progress.DELAY, os.environ[_progress.SWITCH] = delay, switch
-    yb.load("fnn_sideslip/25mps").set({"stop_time": 1}).run()
-    print("rich.progress" in sys.modules)
+    base.run()
+    print("rich.progress" in sys.modules, file=open(sys.argv[1], "a"))
 """
 
 
-def started(**pipes) -> subprocess.CompletedProcess[str]:
-    environment = os.environ | {"TERM": "xterm"}
+def test_a_terminal_sees_a_bar_after_the_delay_unless_it_is_switched_off_and_a_pipe_none(tmp_path):
+    options: dict[str, Any] = {"cwd": ROOT, "env": os.environ | {"TERM": "xterm"}}
     command = [sys.executable, "-c", PROGRAM]
-    return subprocess.run(command, cwd=ROOT, env=environment, text=True, check=True, **pipes)
-
-
-def test_a_terminal_sees_a_bar_after_the_delay_unless_it_is_switched_off():
-    leader, follower = pty.openpty()
-    done = started(stdout=subprocess.PIPE, stderr=follower)
-    os.close(follower)
-    assert done.stdout.split() == ["False", "False", "True"]
-    os.set_blocking(leader, False)
-    assert "Sideslip tracking" in os.read(leader, 100_000).decode()
-    os.close(leader)
-
-
-def test_only_a_terminal_sees_a_bar():
-    silent = started(capture_output=True)
-    assert (silent.stdout.split(), silent.stderr) == (3 * ["False"], "")
+    shown = seen_on_terminal([*command, tmp_path / "terminal"], "stderr", **options)
+    assert "Sideslip tracking" in shown
+    assert (tmp_path / "terminal").read_text().split() == ["False", "False", "True"]
+    silent = subprocess.run([*command, tmp_path / "pipe"], stderr=subprocess.PIPE, check=True, **options)
+    assert silent.stderr == b""
+    assert (tmp_path / "pipe").read_text().split() == 3 * ["False"]

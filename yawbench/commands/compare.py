@@ -63,8 +63,6 @@ def compare(
     Without --out, results go to results/<folder of the scenario>/<its name>-compare. A run that
     fails is reported; the other runs continue.
     """
-    from dataclasses import replace
-
     from yawbench.orchestrator.results.folder_names import default_folder
     from yawbench.reports.comparison_page import comparison_view
     from yawbench.studies.comparison import comparison, comparison_table
@@ -83,8 +81,8 @@ def compare(
     command = command_of("compare", scenario, **options.changing | {"swap": swap} | beside)
     compared = comparison_view(findings)
     views = compared.views if compared else []
-    chapter = chapter_of(findings, folder, command, views=views, measured=recordings)
-    say_page(write_page(replace(chapter, comparison=compared), folder))
+    chapter = chapter_of(findings, folder, command, views=views, measured=recordings, comparison=compared)
+    say_page(write_page(chapter, folder))
     output.answer(experiments=[data_of(findings, folder)])
     if findings.failed:
         raise typer.Exit(1)

@@ -103,7 +103,6 @@ def converge(
         figure = convergence_figure(rows, signal, experiment.title, note)
         save(figure, folder / "converge")
         charts = [image_of(folder / "converge.svg", experiment.title)]
-    chapter = chapter_of(findings, folder, command)
-    say_page(write_page(replace(chapter, results=[table], charts=charts), folder))
+    say_page(write_page(chapter_of(findings, folder, command, results=[table], charts=charts), folder))
     if any(row.failed for row in rows):
         raise typer.Exit(1)

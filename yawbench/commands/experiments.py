@@ -150,8 +150,12 @@ def chapter_of(
     views: Sequence[View] = (),
     measured: Sequence[LabelledRun] = (),
     each: Each = map,
+    **parts: Any,
 ) -> StudyPage:
-    """Return what the page of an experiment in its folder shows; say which runs are out of date."""
+    """Return what the page of an experiment in its folder shows; say which runs are out of date.
+
+    `parts`: fields of the page in place of those that every experiment has.
+    """
     from yawbench.orchestrator.results.freshness import staleness
     from yawbench.orchestrator.results.run_record import RUN_FILE
     from yawbench.reports.study_page import chapter
@@ -168,7 +172,7 @@ def chapter_of(
         )
     for name, why in stale.items():
         say(f"{name}: out of date: {why}")
-    return page
+    return replace(page, **parts)
 
 
 def command_of(preset: str, path: Path, *, quick: bool = False, **options: Iterable[object] | None) -> str:

@@ -8,17 +8,16 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+from yawbench.events.kinds import RunWatch
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-    from yawbench.foundation.errors import Diagnostic
-    from yawbench.orchestrator.master.simulate import Watch
     from yawbench.orchestrator.plan import Plan
-    from yawbench.orchestrator.results.run_record import EventRecord
 
 MOST = 4
 """Curves at once. Chosen: so many fit on a terminal of 24 lines."""
@@ -32,21 +31,21 @@ DOTS = np.array([[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]])
 """Dots of a braille character by row and column (Unicode, block 2800 to 28FF)."""
 
 
-class Live:
-    """Shows the rows of a run as they are recorded, and passes them on to another observer.
+class Live(RunWatch):
+    """Looks at a run as `RunWatch` does, and shows its rows as they are recorded.
 
     Args:
         plan: of the run.
-        watch: looks at the rows, too.
         terminal: whether there is a terminal that can redraw.
     """
 
-    def __init__(self, plan: Plan, watch: Watch, *, terminal: bool) -> None:
+    def __init__(self, plan: Plan, *, terminal: bool) -> None:
         from yawbench.figures.display import shown_unit, unit_of_signal
         from yawbench.figures.plots import OVERVIEW
         from yawbench.metrics.measures import variable_of, words
         from yawbench.orchestrator.results.record_of_plan import recorded_variables, units_of
 
+        super().__init__(plan)
         variables, units = recorded_variables(plan), units_of(plan)
         reals = [name for name, variable in variables.items() if variable.type == "Real"]
         usual = [name for wanted in OVERVIEW for name in reals if variable_of(name) == wanted]
@@ -56,7 +55,7 @@ class Live:
         self._units, self._factors = [unit for unit, _ in shown], np.array([factor for _, factor in shown])
         self._names = [f"{words(variable_of(name))} ({name})" for name in chosen]
         self._span = plan.time(0), plan.time(plan.n_steps)
-        self._watch, self._drawn, self._last = watch, 0.0, np.full(1 + len(chosen), np.nan)
+        self._drawn, self._last = 0.0, np.full(1 + len(chosen), np.nan)
         self._live = None
         if terminal:
             from rich.console import Console
@@ -77,9 +76,8 @@ class Live:
         if self._live is not None:
             self._live.stop()
 
-    def look(self, rows: np.ndarray, /) -> None:
-        """Look at rows: shape (n, 1 + Real columns), time first."""
-        self._watch.look(rows)
+    def look(self, rows: np.ndarray) -> None:
+        super().look(rows)
         values = rows[:, self._at] * self._factors
         self._last = np.concatenate([rows[-1, :1], values[-1]])
         if self._live is not None:
@@ -92,18 +90,6 @@ class Live:
                 self._ends[1, :, dot] = np.fmax(self._ends[1, :, dot], np.fmax.reduce(here))
         if time.monotonic() - self._drawn >= (TOLD if self._live is None else EVERY):
             self._show()
-
-    def warnings(self) -> tuple[Diagnostic, ...]:
-        """Return the warnings so far."""
-        return self._watch.warnings()
-
-    def events(self) -> list[EventRecord] | None:
-        """Return the events so far."""
-        return self._watch.events()
-
-    def geometry(self) -> dict[str, Any]:
-        """Return where the run takes place."""
-        return self._watch.geometry()
 
     def _show(self) -> None:
         self._drawn = time.monotonic()

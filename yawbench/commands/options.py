@@ -15,6 +15,8 @@ from yawbench.foundation.errors import ScenarioError
 from yawbench.orchestrator.fault_kinds import KINDS, NO_FAULTS
 from yawbench.orchestrator.results.file_formats import FORMATS
 
+from .output import BUILDING, OPENING, announced, with_options
+
 if TYPE_CHECKING:
     from yawbench.fmus.opener import Building
     from yawbench.orchestrator.plan import Override, Plan
@@ -336,17 +338,13 @@ def takes(*names: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
     shared = inspect.signature(RunOptions, eval_str=True).parameters
 
     def taking(command: Callable[..., None]) -> Callable[..., None]:
-        own = inspect.signature(command, eval_str=True).parameters
-
         @functools.wraps(command)
         def called(**arguments: Any) -> None:
             options = RunOptions(**{name: arguments.pop(name) for name in names})
             command(**arguments, options=options)
 
-        every = [parameter for name, parameter in own.items() if name != "options"]
-        every += [parameter for name, parameter in shared.items() if name in names]
-        called.__signature__ = inspect.Signature(every)  # type: ignore[attr-defined]
-        return called
+        more = {name: (own.default, own.annotation) for name, own in shared.items() if name in names}
+        return with_options(command, called, without="options", **more)
 
     return taking
 
@@ -366,8 +364,6 @@ def plan_of_scenario(scenario: Path, options: RunOptions, record: Sequence[str] 
         YawbenchError: the scenario, an option or an FMU is invalid, or a component cannot be built.
     """
     from yawbench.planner import Planner
-
-    from .output import BUILDING, OPENING, announced
 
     planner = Planner(build=options.build)
     loaded = planner.load(scenario, options.changes, validate=not options.no_validate)

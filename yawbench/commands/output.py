@@ -147,13 +147,18 @@ def tabular(command: Callable[..., None]) -> Callable[..., None]:
 
 
 def with_options(
-    command: Callable[..., None], called: Callable[..., None], **options: tuple[Any, Any]
+    command: Callable[..., None],
+    called: Callable[..., None],
+    *,
+    without: str = "",
+    **options: tuple[Any, Any],
 ) -> Callable[..., None]:
     """Return what is called for a command, with the command's signature and further options.
 
     Args:
         command: has parameters of its own.
         called: takes them and the options by name.
+        without: a parameter of the command that `called` makes itself.
         options: name -> default and annotation.
     """
     kind = inspect.Parameter.KEYWORD_ONLY
@@ -162,7 +167,7 @@ def with_options(
         inspect.Parameter(name, kind, default=default, annotation=annotation)
         for name, (default, annotation) in options.items()
     )
-    every = [*(parameter.replace(kind=kind) for parameter in own), *more]
+    every = [*(parameter.replace(kind=kind) for parameter in own if parameter.name != without), *more]
     called.__signature__ = inspect.Signature(every)  # type: ignore[attr-defined]
     return called
 

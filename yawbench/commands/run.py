@@ -260,11 +260,10 @@ def _seen(plan: Plan, live: bool) -> Iterator[Watch]:
     """Yield the observer of a run, which shows its curves if it is `live`."""
     from yawbench.events.kinds import RunWatch
 
-    watch = RunWatch(plan)
     if not live:
-        yield watch
+        yield RunWatch(plan)
         return
     from .live import Live
 
-    with Live(plan, watch, terminal=shows_bars()) as shown:
+    with Live(plan, terminal=shows_bars()) as shown:
         yield shown

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -93,6 +92,5 @@ def tune(context: typer.Context, file: TuningFile, options: RunOptions, seed: Tu
         plugins.require("use of a tuning", "entries")(experiment, tuned, folder, command)
     save(history_figure(experiment, tuned, command), folder / "history")
     charts = [image_of(folder / "history.svg", experiment.spec.title)]
-    chapter = chapter_of(findings, folder, command)
-    say_page(write_page(replace(chapter, results=[table], charts=charts), folder))
+    say_page(write_page(chapter_of(findings, folder, command, results=[table], charts=charts), folder))
     output.answer(experiments=[data_of(findings, folder)])
