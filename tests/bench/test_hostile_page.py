@@ -255,17 +255,6 @@ def test_no_other_site_leads_to_the_bench(server, site):
         assert ask(server, path, **own)[0] in (200, 303)
 
 
-def test_a_link_of_another_site_does_not_begin_a_run(server, outside, chromium: Browser, tmp_path):
-    """As after the address has been sent to somebody."""
-    ahead = server.bench._key_ahead
-    (tmp_path / "site.html").write_text(f'<a href="{server.address}bench?scenario={SCENARIO}">on</a>')
-    chromium.open(tmp_path / "site.html")
-    chromium.run("document.querySelector('a').click()")
-    chromium.wait_for("location.pathname.endsWith('bench')")
-    assert "another site" in chromium.run("return document.body.textContent")
-    assert server.bench._key_ahead == ahead
-
-
 def test_the_servers_own_pages_can_be_neither_framed_nor_kept_hold_of(server):
     for path in ("", f"bench?scenario={SCENARIO}", "view?run=runs/one"):
         headers = ask(server, path)[1]

@@ -158,14 +158,14 @@ def inaccessible(chromium: Browser, *colours: str) -> list[str]:
         wish = {"name": "prefers-color-scheme", "value": scheme}
         calm = {"name": "prefers-reduced-motion", "value": "reduce"}
         chromium.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "", "features": [wish, calm]})
-        chromium.run(_axe())
+        chromium.run(axe())
         found += [f"{scheme}: {said}" for said in chromium.driver.execute_async_script(AXE)]
     chromium.run("scrollTo({top: 0, behavior: 'instant'})")  # axe-core scrolls to what it looks at
     return found
 
 
 @functools.cache
-def _axe() -> str:
+def axe() -> str:
     """Return the script of axe-core."""
     return (files("axe_selenium_python") / "node_modules/axe-core/axe.min.js").read_text(encoding="utf-8")
 

@@ -12,7 +12,7 @@ from tests.fmu_copies import put_fmus
 from tests.refusals import each_mentions, mentions
 from tests.reports.browser import DESK, PHONE
 from tests.reports.flaws import check_whole, looks, open_all, size_without_samples
-from tests.reports.made_up import data_in, unpacked
+from tests.reports.made_up import data_in, texts, unpacked
 
 ROOT = Path(__file__).parents[2]
 UNITS = (
@@ -38,10 +38,6 @@ def page(tmp_path_factory) -> Path:
 @pytest.fixture(scope="module")
 def tree(page):
     return html.fromstring(unpacked(page))
-
-
-def texts(tree, path: str) -> list[str]:
-    return [" ".join(element.text_content().split()) for element in tree.cssselect(path)]
 
 
 def test_metrics_stand_side_by_side_with_their_difference_from_the_first(tree):

@@ -191,7 +191,7 @@ def test_a_link_shows_the_same_runs_limit_and_brush_again(chromium, sweep):
 
 
 def test_a_missing_side_file_is_said_on_the_page(chromium, sweep, tmp_path):
-    opened(chromium, shutil.copy(sweep.page, tmp_path))
+    opened(chromium, Path(shutil.copy(sweep.page, tmp_path)))
     chromium.run(VIEW + "view.open(view.data.sides.indexOf(true))")
     chromium.wait_for("document.querySelector('.ys-remark p')")
     assert "is missing" in chromium.run("return document.querySelector('.ys-remark').textContent")
