@@ -248,8 +248,9 @@ def check_budgets(chromium: Browser, page: Path) -> None:
 
 
 def check_whole(chromium: Browser, page: Path, width: int, colours: str) -> None:
-    """Open a page with everything unfolded: it has no flaws, and stays within the budget without samples."""
+    """Open a page and unfold everything: it has no flaws, and stays within the budget without samples."""
     chromium.open(page, width=width)
+    assert flaws(chromium) == []
     open_all(chromium)
     assert flaws(chromium) == []
     assert inaccessible(chromium, colours) == []
