@@ -11,9 +11,9 @@ from tests.orchestrator.recorded import car, noted, results
 from tests.refusals import each_mentions, mentions, refused
 from yawbench.figures.panels import LabelledRun, check_panels, thinned
 from yawbench.figures.plots import draw, minus, provenance, title_of
-from yawbench.figures.style import LINES, save
+from yawbench.figures.style import LINES, literal, save
 from yawbench.foundation.errors import ResultsError, ScenarioError
-from yawbench.foundation.messages import printable
+from yawbench.orchestrator.plan import Override
 
 
 def panel(figure, name):
@@ -220,8 +220,9 @@ def test_a_run_that_ended_at_its_start_is_one_sentence(rows):
 
 
 def test_a_figure_is_valid_svg_whatever_characters_labels_have(tmp_path):
-    labels = ["\x1b[31mred", "a\x00b", "\u202eturned", "\ufffe\uffff", "\ud800", "<&>\"'"]
+    labels = ["\x1b[31mred", "a\x00b", "\u202eturned", "\ufffe\uffff", "\ud800", "<&>\"'", "$a_{$", r"$\b$"]
     runs, title = [LabelledRun(label, car(1.2)) for label in labels], " ".join(labels)
+    noted(runs[0].results, changes=[Override.of("driver.name", "$x_{", "--set").record])
     panels = {"plot": "yaw_rate", "portrait": "yaw_rate(sideslip)"}
     figures = {name: draw(runs, [panel], title=title) for name, panel in panels.items()}
     for name, figure in figures.items():
@@ -229,4 +230,4 @@ def test_a_figure_is_valid_svg_whatever_characters_labels_have(tmp_path):
         root = ElementTree.parse(svg).getroot()
         assert root.tag == "{http://www.w3.org/2000/svg}svg"
         assert png.stat().st_size
-        assert {*map(printable, labels)} <= {*legend(figure)}
+        assert {*map(literal, labels)} <= {*legend(figure)}

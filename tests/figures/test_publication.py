@@ -21,6 +21,7 @@ from yawbench.figures.plots import draw
 from yawbench.figures.style import LINES, STYLES
 
 SINGLE = ("--panel", "yaw_rate")
+OTHERS = ("sideslip", "acceleration_y", "steer_angle", "path")
 
 
 @pytest.fixture
@@ -39,23 +40,15 @@ def two(tmp_path_factory) -> Path:
     return folder
 
 
-def test_a_pdf_has_the_size_and_embedded_truetype_fonts(run):
-    assert status_of("plot", run, *SINGLE, "--size", "88x60mm", "--style", "ieee", "--out", "fig.pdf") == 0
+@pytest.mark.sampled(1)
+@pytest.mark.parametrize("style", STYLES)
+def test_a_pdf_has_the_size_and_embedded_truetype_fonts(run, style):
+    assert status_of("plot", run, *SINGLE, "--size", "88x60mm", "--style", style, "--out", "fig.pdf") == 0
     text = Path("fig.pdf").read_bytes()
     box = [float(one) for one in re.search(rb"/MediaBox \[([^]]*)\]", text)[1].split()]
     assert box[2:] == pytest.approx([88 / 25.4 * 72, 60 / 25.4 * 72], abs=0.01)
     assert b"/FontFile2" in text and b"/Type3" not in text
     assert [path.name for path in Path().iterdir() if path.is_file()] == ["fig.pdf"]
-
-
-@pytest.mark.skipif(not shutil.which("pdffonts"), reason="pdffonts is not installed")
-@pytest.mark.sampled(1)
-@pytest.mark.parametrize("style", STYLES)
-def test_every_font_is_embedded(run, style):
-    assert status_of("plot", run, *SINGLE, "--style", style, "--out", "fig.pdf") == 0
-    listed = subprocess.run(["pdffonts", "fig.pdf"], capture_output=True, text=True, check=True).stdout
-    fonts = listed.splitlines()[2:]
-    assert fonts and all(" yes yes " in font for font in fonts)
 
 
 @pytest.mark.parametrize("kind", ["svg", pytest.param("png", marks=pytest.mark.exhaustive), "pdf"])
@@ -127,7 +120,7 @@ def test_a_difference_needs_two_runs(run, capsys):
 @pytest.mark.parametrize("style", ["ieee", pytest.param("elsevier", marks=pytest.mark.exhaustive)])
 def test_a_style_grows_with_its_panels(run, style):
     sizes = []
-    for panels in (SINGLE, (*SINGLE, "--panel=sideslip", "--panel=acceleration_y", "--panel=path")):
+    for panels in (SINGLE, (*SINGLE, *(f"--panel={name}" for name in OTHERS))):
         assert status_of("plot", run, *panels, "--style", style, "--out", "fig.png") == 0
         sizes.append(Image.open("fig.png").size)
     (single, low), (wide, high) = sizes
