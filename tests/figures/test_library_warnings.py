@@ -23,11 +23,11 @@ from yawbench.reports.divergence import divergence
 from yawbench.reports.viewer import page
 
 GROWTH = {
-    "huge": lambda t: 10.0 ** (75 * t),
-    "infinite": lambda t: np.where(t > 1.5, np.inf, 1.0) * np.where(t > 2.5, -1.0, 1.0),
-    "no number": lambda t: np.where(t > 1.5, np.nan, 1.0),
     "all at once": lambda t: np.choose(np.clip(t, 0, 3).astype(int), [1.0, 1e308, np.inf, np.nan]),
+    "no number": lambda t: np.where(t > 1.5, np.nan, 1.0),
     "zero": lambda t: np.zeros_like(t),
+    "infinite": lambda t: np.where(t > 1.5, np.inf, 1.0) * np.where(t > 2.5, -1.0, 1.0),
+    "huge": lambda t: 10.0 ** (75 * t),
 }  # fmt: skip
 
 
@@ -50,6 +50,7 @@ def silent():
 
 
 @pytest.mark.parametrize("kind", GROWTH)
+@pytest.mark.sampled(3)
 @pytest.mark.usefixtures("silent")
 def test_the_library_warns_of_no_arithmetic(kind, tmp_path):
     run, usual = grown(kind), whole_car(n=161)
