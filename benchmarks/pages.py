@@ -8,9 +8,8 @@ several, followed by the median. The page is that of a comparison of four runs o
 from __future__ import annotations
 
 import tempfile
-import threading
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager, redirect_stdout
+from collections.abc import Mapping, Sequence
+from contextlib import redirect_stdout
 from io import StringIO
 from pathlib import Path
 from statistics import median
@@ -18,11 +17,10 @@ from time import perf_counter
 
 import pytest
 
+from tests.bench.test_serve import serving
 from tests.command_line import status_of
 from tests.reports.browser import Browser, start
 from tests.reports.flaws import size_without_samples
-from yawbench.bench.server import ResultsServer
-from yawbench.bench.sliders import Bench
 from yawbench.reports.page_parts import PAGE
 
 SCENARIO = "fnn_sideslip/25mps"
@@ -99,26 +97,11 @@ def sizes(pages: Mapping[str, tuple[Path, int]]) -> None:
         print(f"  {f'{title}: kB; without samples':62s}{whole:7.0f}{without:9.0f}   {most}; 250")
 
 
-@contextmanager
-def served() -> Iterator[ResultsServer]:
-    """Serve an empty folder."""
-    with (
-        tempfile.TemporaryDirectory() as folder,
-        closing(Bench()) as bench,
-        ResultsServer(Path(folder), bench) as server,
-    ):
-        thread = threading.Thread(target=server.serve_forever)
-        thread.start()
-        yield server
-        server.shutdown()
-        thread.join()
-
-
 def sliders(browser: Browser) -> None:
     """Print the times of the bench with sliders: each first curve is that of a server of its own."""
     shown, whole, moves = [], [], []
     for _ in range(LOADS):
-        with served() as server:
+        with tempfile.TemporaryDirectory() as folder, serving(Path(folder)) as server:
             began = perf_counter()
             browser.driver.get(f"{server.address}bench?scenario={SCENARIO}")
             browser.wait_for("document.querySelector('form.bench').dataset.shown")

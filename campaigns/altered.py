@@ -41,6 +41,7 @@ from typing import Any
 import numpy as np
 from ruamel.yaml import YAML
 
+from tests.command_line import status_of
 from tests.commands.test_batch_commands import SCENARIO as HALF
 from tests.commands.test_batch_commands import STUDY
 from tests.measured_cars.test_fit import FIT, MEASURED
@@ -96,12 +97,8 @@ class Folder:
 
 def call(*arguments: object) -> int:
     """Return the exit status of a command in this process."""
-    try:
-        with contextlib.redirect_stdout(io.StringIO()):
-            yawbench([str(argument) for argument in arguments])
-    except SystemExit as ended:
-        return int(ended.code or 0)
-    return 0
+    with contextlib.redirect_stdout(io.StringIO()):
+        return status_of(*arguments)
 
 
 def base(place: Path) -> Folder:
@@ -161,20 +158,6 @@ def base(place: Path) -> Folder:
 # ---- alterations ----
 
 
-def places_in(content: Any) -> list[tuple[Any, Any]]:
-    """Return all (container, key) below a value."""
-    found: list[tuple[Any, Any]] = []
-
-    def collect(part: Any) -> None:
-        keys = list(part) if isinstance(part, dict) else range(len(part)) if isinstance(part, list) else ()
-        for key in keys:
-            found.append((part, key))
-            collect(part[key])
-
-    collect(content)
-    return found
-
-
 def other_value(value: Any, others: list[Any], r: random.Random) -> Any:
     """Return what an alteration puts in the place of a value: mostly of its type."""
     if r.random() < 0.15:
@@ -217,7 +200,7 @@ def other_value(value: Any, others: list[Any], r: random.Random) -> Any:
 def alter(content: Any, others: list[Any], r: random.Random) -> None:
     """Alter one to four values, keys or parts in place."""
     for _ in range(r.choice((1, 1, 1, 2, 4))):
-        places = places_in(content)
+        places = mutate.places_in(content)
         if not places:
             return
         part, key = r.choice(places)
@@ -408,7 +391,7 @@ def case(group: str, number: int, seed: int, folder: Folder, box: Path) -> tuple
         folder.place / "fit.yaml"
     ]
     other = YAML(typ="safe").load(r.choice(pool).read_bytes())
-    others = [part[key] for part, key in places_in(other)]
+    others = [part[key] for part, key in mutate.places_in(other)]
     (box / file).write_bytes(altered(source, others, r))
     return command_of(group, file, box, r)
 

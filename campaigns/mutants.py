@@ -19,8 +19,6 @@ from __future__ import annotations
 import argparse
 import ast
 import contextlib
-import importlib
-import itertools
 import json
 import os
 import random
@@ -52,20 +50,6 @@ AT_LEAST, WHOLE = 60.0, 15.0
 TOO_SLOW = "too slow"
 MEMORY = 8 << 30
 """Limit of a trial's memory [bytes]."""
-LIBRARIES = (
-    *(
-        "numpy",
-        "scipy.signal",
-        "scipy.optimize",
-        "scipy.linalg",
-        "scipy.interpolate",
-        "scipy.stats",
-        "pandas",
-    ),
-    *("pyarrow.csv", "pyarrow.parquet", "matplotlib.figure", "matplotlib.backends.backend_svg", "pydantic"),
-    *("ruamel.yaml", "rich.table", "typer", "jinja2", "lxml.html", "fmpy", "pythonfmu", "cssselect"),
-)
-"""Imported once for all trials."""
 AS_RECORDED = {"PYTHONDONTWRITEBYTECODE": "1", "OPENBLAS_NUM_THREADS": "1", "PYTHONHASHSEED": "0"}
 
 
@@ -312,58 +296,23 @@ def _statement(code: str, line: int) -> tuple[int, int]:
 
 
 def run_tests(checkout: Path, tests: Sequence[str], seconds: float, without: Sequence[str] = ()) -> str:
-    """Run tests of a checkout in a copy of this process; return the first that failed, or nothing."""
-    reading, writing = os.pipe()
-    child = os.fork()
-    if not child:
-        os.setpgid(0, 0)
-        os.close(reading)
-        silent = os.open(os.devnull, os.O_RDWR)
-        for descriptor in range(3):
-            os.dup2(silent, descriptor)
-        resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
-        os.chdir(checkout)
-        sys.path[:] = [str(checkout) if entry in ("", os.getcwd()) else entry for entry in sys.path]
-        sys.path.insert(0, str(checkout))
-        first = _First()
+    """Run tests of a checkout; return the first that failed, or nothing."""
+    options = ["-x", "-q", "-p", "no:cacheprovider", "-m", "not exhaustive"]
+    options += [f"--deselect={test}" for test in without]
+    with subprocess.Popen(
+        [sys.executable, "-m", "pytest", *options, *tests], cwd=checkout, env=os.environ | AS_RECORDED,
+        stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
+        start_new_session=True, preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY)),
+    ) as process:  # fmt: skip
         try:
-            options = ["-x", "-q", "-p", "no:cacheprovider", "-m", "not exhaustive"]
-            options += [f"--deselect={test}" for test in without]
-            status = int(pytest.main([*options, *tests], plugins=[first]))
-        except BaseException:
-            status = 3
-        os.write(writing, (first.failed or ("" if status in (0, 5) else f"status {status}")).encode())
-        os._exit(0)
-    os.close(writing)
-    os.set_blocking(reading, False)
-    end = time.monotonic() + seconds
-    while time.monotonic() < end and os.waitpid(child, os.WNOHANG) == (0, 0):
-        time.sleep(0.05)
-    try:
-        told = os.read(reading, 65536).decode()
-        answered = time.monotonic() < end
-    except BlockingIOError:
-        told, answered = "", False
-    os.close(reading)
-    if not answered:
-        os.killpg(child, signal.SIGKILL)
-        os.waitpid(child, 0)
-        return TOO_SLOW
-    return told
-
-
-class _First:
-    """Plug-in of pytest: the first test that failed."""
-
-    failed = ""
-
-    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        if report.failed and not self.failed:
-            self.failed = report.nodeid
-
-    def pytest_collectreport(self, report: pytest.CollectReport) -> None:
-        if report.failed and not self.failed:
-            self.failed = report.nodeid
+            told, _ = process.communicate(timeout=seconds)
+        except subprocess.TimeoutExpired:
+            os.killpg(process.pid, signal.SIGKILL)
+            return TOO_SLOW
+    failed = re.search(r"(?m)^(?:FAILED|ERROR) (\S+?(?:::\S+?(?:\[.*?\])?)?)(?: - .*)?$", told)
+    if process.returncode in (0, 5):
+        return ""
+    return failed[1] if failed else f"status {process.returncode}"
 
 
 def existing(checkout: Path, tests: Iterable[str]) -> list[str]:
@@ -371,11 +320,8 @@ def existing(checkout: Path, tests: Iterable[str]) -> list[str]:
     kept = []
     for test in tests:
         file, _, name = test.partition("::")
-        if not name and (checkout / file).exists():
-            kept.append(test)
         function = name.partition("[")[0].split("::")[-1]
-        text = (checkout / file).read_text(encoding="utf-8") if (checkout / file).exists() else ""
-        if name and f"def {function}(" in text:
+        if (checkout / file).exists() and f"def {function}" in (checkout / file).read_text(encoding="utf-8"):
             kept.append(test)
     return kept
 
@@ -422,19 +368,15 @@ class Trials:
 
     @contextlib.contextmanager
     def mutated(self, mutant: dict[str, Any]) -> Iterator[None]:
-        """Have the checkout hold a mutant."""
+        """Have the checkout hold a mutant, which no compiled module passes for: it is newer than that."""
         file = self.checkout / mutant["module"]
         was, times = file.read_bytes(), file.stat()
         try:
             file.write_text(mutant["code"], encoding="utf-8")
-            os.utime(file, (times.st_atime, next(_times)))  # no compiled module passes for it
             yield
         finally:
             file.write_bytes(was)
             os.utime(file, ns=(times.st_atime_ns, times.st_mtime_ns))
-
-
-_times = itertools.count(1_000_000_000 + 1000 * int(time.time() % 1_000_000))
 
 
 def try_all(checkout: Path, mutants: Path, out: Path, killed_in: Path | None) -> None:
@@ -442,11 +384,6 @@ def try_all(checkout: Path, mutants: Path, out: Path, killed_in: Path | None) ->
     drawn = json.loads(mutants.read_text(encoding="utf-8"))
     before = json.loads(killed_in.read_text(encoding="utf-8")) if killed_in else {}
     outcomes = json.loads(out.read_text(encoding="utf-8")) if out.exists() else {}
-    for library in LIBRARIES:
-        with contextlib.suppress(ImportError):
-            importlib.import_module(library)
-    os.environ |= AS_RECORDED
-    sys.dont_write_bytecode = True
     trials = Trials(checkout, drawn["took"])
     for number, mutant in enumerate(drawn["mutants"]):
         key = str(number)

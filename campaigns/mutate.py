@@ -7,7 +7,7 @@ import json
 import random
 import re
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 from ruamel.yaml import YAML as RUAMEL
@@ -117,17 +117,18 @@ def _lines(data: bytes, r: random.Random) -> bytes:
     return b"".join(lines)
 
 
+def places_in(content: Any) -> list[tuple[Any, Any]]:
+    """Return all (container, key) below a value."""
+    if not isinstance(content, (dict, list)):
+        return []
+    keys: Iterable[Any] = list(content) if isinstance(content, dict) else range(len(content))
+    return [place for key in keys for place in ((content, key), *places_in(content[key]))]
+
+
 def _structure(data: bytes, r: random.Random) -> bytes:
     """Replace, move, drop or repeat a part of what a YAML file holds; the result is JSON, so YAML too."""
     content = RUAMEL(typ="safe").load(data)
-    places: list[tuple[Any, Any]] = []
-
-    def collect(part: Any) -> None:
-        for key in part if isinstance(part, dict) else range(len(part)) if isinstance(part, list) else ():
-            places.append((part, key))
-            collect(part[key])
-
-    collect(content)
+    places = places_in(content)
     for _ in range(r.choice((1, 1, 1, 2, 5))):
         part, key = r.choice(places)
         other, its_key = r.choice(places)

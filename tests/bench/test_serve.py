@@ -13,6 +13,8 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -20,7 +22,7 @@ import numpy as np
 import pytest
 
 from tests.orchestrator.recorded import noted, write
-from tests.refusals import each_mentions
+from tests.refusals import each_mentions, refused
 from tests.reports.browser import Browser
 from tests.reports.flaws import inaccessible
 from tests.reports.made_up import data_in, whole_car
@@ -59,6 +61,7 @@ def folder(tmp_path_factory) -> Path:
     write(whole_car(), place / "linked")
     (place / "linked/results.csv").unlink()
     (place / "linked/results.csv").symlink_to(outside / "run/results.csv")
+    os.mkfifo(place / "pipe.csv")
     return place
 
 
@@ -67,8 +70,9 @@ def planner() -> Planner:
     return Planner()
 
 
-@pytest.fixture(scope="module")
-def server(folder) -> Iterator[ResultsServer]:
+@contextmanager
+def serving(folder: Path) -> Iterator[ResultsServer]:
+    """Serve the results below a folder."""
     bench = Bench()
     with ResultsServer(folder, bench) as made:
         thread = threading.Thread(target=made.serve_forever)
@@ -77,6 +81,12 @@ def server(folder) -> Iterator[ResultsServer]:
         made.shutdown()
         thread.join()
     bench.close()
+
+
+@pytest.fixture(scope="module")
+def server(folder) -> Iterator[ResultsServer]:
+    with serving(folder) as made:
+        yield made
 
 
 def ask(server, path, *, method="GET", body=None, token=None, **headers) -> tuple[int, dict[str, str], bytes]:
@@ -127,18 +137,15 @@ def run(server, *settings: str, **changes) -> tuple[int, bytes]:
 # ---- to whom ----
 
 
-def test_the_server_listens_on_this_machine_alone(server):
-    assert server.server_address[0] == "127.0.0.1"
+def test_servers_listen_on_this_machine_alone_and_have_different_tokens(server, folder):
+    with ResultsServer(folder, server.bench) as other:
+        assert other.token != server.token and len(other.token) >= 32
+        assert other.server_address[0] == "127.0.0.1"
 
 
 @pytest.mark.parametrize("address", ["/", "/files/runs/both.html", "/x/", "//", "/TOKEN"])
 def test_without_the_token_everything_is_refused(server, address):
     assert ask(server, address.replace("TOKEN", server.token[:-1]), token="")[0] == 403
-
-
-def test_two_servers_have_different_tokens(server, folder):
-    with ResultsServer(folder, server.bench) as other:
-        assert other.token != server.token and len(other.token) >= 32
 
 
 @pytest.mark.parametrize("host", ["evil.example", "127.0.0.1", "evil.example:PORT", "", None])
@@ -169,18 +176,12 @@ def test_a_run_is_refused_without_origin_or_by_get(server):
     "path",
     [
         "../outside0/secret.txt", "%2e%2e/outside0/secret.txt", "/etc/passwd", "%2Fetc/passwd",
-        "runs//one/run.json",
-        "./runs/both.html",
-        "runs/../link.html", "runs%5C..%5Clink.html", "runs/both.html%00", "", "runs",
+        "runs//one/run.json", "./runs/both.html", "runs/../link.html", "runs%5C..%5Clink.html",
+        "runs/both.html%00", "", "runs",
+        "link.html", "out/secret.txt", "linked/results.csv", "pipe.csv",
     ],
 )  # fmt: skip
-def test_no_path_leaves_the_folder(server, path):
-    assert ask(server, f"files/{path}")[0] == 404
-
-
-@pytest.mark.parametrize("path", ["link.html", "out/secret.txt", "linked/results.csv"])
-def test_no_link_is_followed(server, folder, path):
-    assert (folder / path).exists()
+def test_no_path_leaves_the_folder_and_no_link_or_pipe_is_opened(server, path):
     assert ask(server, f"files/{path}")[0] == 404
 
 
@@ -188,14 +189,6 @@ def test_no_link_is_followed(server, folder, path):
 def test_runs_outside_the_folder_are_not_viewed(server, path):
     status, _, content = ask(server, f"view?run={path}")
     assert status == 422 and b"<html" not in content
-
-
-def test_a_pipe_is_not_served(server, folder):
-    os.mkfifo(folder / "pipe.html")
-    try:
-        assert ask(server, "files/pipe.html")[0] == 404
-    finally:
-        (folder / "pipe.html").unlink()
 
 
 # ---- what ----
@@ -239,9 +232,10 @@ def test_runs_are_found_by_what_was_changed_sorted_and_folded(server, chromium: 
     assert chromium.console() == []
 
 
-def test_pages_are_served_as_they_are_and_sandboxed(server, folder):
-    status, headers, content = ask(server, "files/runs/both.html")
-    assert status == 200 and content == (folder / "runs/both.html").read_bytes()
+@pytest.mark.parametrize("path", ["runs/both.html", "runs/one/results.csv"])
+def test_files_are_served_as_they_are_and_sandboxed(server, folder, path):
+    status, headers, content = ask(server, f"files/{path}")
+    assert status == 200 and content == (folder / path).read_bytes()
     policy = headers["Content-Security-Policy"]
     assert policy.startswith("sandbox") and "allow-same-origin" not in policy
     assert headers["Referrer-Policy"] == "no-referrer"
@@ -275,13 +269,12 @@ def test_the_first_run_of_a_page_is_made_before_the_page_asks_for_it():
 def test_a_run_ahead_makes_way_for_another_that_is_asked_for():
     bench = Bench()
     long = Job("long", find(SCENARIO, "a scenario"), Path(), read_changes((), ("stop_time=2000",), ()))
-    thread = threading.Thread(target=bench._make_ahead, args=(replace(long, plan=planned(long)[1]),))
-    thread.start()
-    while not bench._turn.locked() and thread.is_alive():
-        time.sleep(0.01)
-    key, _ = bench.run(Wanted("p", "", SCENARIO, (BRIEF,)))
-    bench.close()
-    thread.join()
+    with ThreadPoolExecutor() as threads:
+        ahead = threads.submit(bench._make_ahead, replace(long, plan=planned(long)[1]))
+        while not (bench._turn.locked() or ahead.done()):
+            time.sleep(0.01)
+        key, _ = bench.run(Wanted("p", "", SCENARIO, (BRIEF,)))
+        bench.close()
     assert list(bench._kept) == [key]
 
 
@@ -357,23 +350,15 @@ def test_an_address_that_cannot_be_read_is_refused(server):
 
 def test_a_running_run_makes_way():
     bench = Bench()
-    long = Wanted("p", "", SCENARIO, ("stop_time=2000",))
-    caught = []
-
-    def first() -> None:
-        try:
-            bench.run(long)
-        except Superseded as error:
-            caught.append(error.code)
-
-    thread = threading.Thread(target=first)
-    thread.start()
-    while not bench._latest and thread.is_alive():
-        time.sleep(0.01)
-    key, _ = bench.run(Wanted("p", "", SCENARIO, (BRIEF,)))
-    thread.join()
+    with ThreadPoolExecutor() as threads:
+        long = threads.submit(bench.run, Wanted("p", "", SCENARIO, ("stop_time=2000",)))
+        while not (bench._latest or long.done()):
+            time.sleep(0.01)
+        key, _ = bench.run(Wanted("p", "", SCENARIO, (BRIEF,)))
     bench.close()
-    assert caught == ["run-superseded"] and bench.block(key)
+    with refused(Superseded, "run-superseded"):
+        long.result()
+    assert bench.block(key)
 
 
 def test_sliders_have_units_and_the_vocabularys_ranges(server):
@@ -414,11 +399,12 @@ def test_a_slider_runs_the_car_and_the_link_opens_the_same(server, chromium: Bro
     chromium.driver.get(f"{server.address}bench?scenario={SCENARIO}")
     ready = "document.querySelector('form.bench')?.dataset.shown"
     chromium.wait_for(ready)
-    chromium.run(
+    turn = (
         "document.querySelector('form.bench').dataset.shown = '';"
-        "const number = document.querySelector('.knob input[type=number]');"
-        "number.value = 0.4; number.dispatchEvent(new Event('change'));"
+        "const number = document.querySelectorAll('.knob input[type=number]')[arguments[0]];"
+        "number.value = arguments[1]; number.dispatchEvent(new Event('change'));"
     )
+    chromium.run(turn, 0, 0.4)
     chromium.wait_for(ready)
     labels = "return document.querySelector('.yv').viewer.runs.map((run) => run.label)"
     assert chromium.run(labels) == ["friction=0.4", "before: the scenario"]
@@ -429,11 +415,7 @@ def test_a_slider_runs_the_car_and_the_link_opens_the_same(server, chromium: Bro
     chromium.driver.get(link)
     chromium.wait_for(ready)
     assert chromium.run(labels) == ["friction=0.4"]
-    chromium.run(
-        "document.querySelector('form.bench').dataset.shown = '';"
-        "const number = document.querySelectorAll('.knob input[type=number]')[1];"
-        "number.value = 72; number.dispatchEvent(new Event('change'));"
-    )
+    chromium.run(turn, 1, 72)
     chromium.wait_for(ready)
     assert chromium.run(command) == f"yawbench run {SCENARIO} --set friction=0.4 --set 'speed=72 km/h'"
     assert chromium.console() == []

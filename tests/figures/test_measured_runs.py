@@ -19,6 +19,7 @@ from yawbench.figures.style import MEASURED_LINE
 
 TIME = np.arange(10.0, 16.0, 0.01)
 SLOW, FAST = (np.sin(2.0 * np.pi * f * TIME) for f in (0.5, 15.0))
+DASHED = f'"dash":{list(MEASURED_LINE[1])}'.replace(" ", "")
 MEASURED = """files: [{name}.csv]
 time: {{unit: s}}
 signals: {{yaw_rate: r, acceleration_y: a_y, velocity_x: v}}
@@ -67,9 +68,7 @@ def test_the_commands_take_measurements_beside_runs(places, tmp_path, capsys):
     assert status_of("plot", results, *options, "--panel", "yaw_rate", "--out", tmp_path / "fig.svg") == 0
     assert (tmp_path / "fig.svg").is_file()
     assert status_of("animate", results, *options, "--out", tmp_path / "view.html") == 0
-    assert f'"dash": {list(MEASURED_LINE[1])}'.replace(" ", "") in (
-        unpacked(tmp_path / "view.html").replace(" ", "")
-    )
+    assert DASHED in unpacked(tmp_path / "view.html").replace(" ", "")
     capsys.readouterr()
     assert status_of("diff", results, car, "--from", "10 s") == 0
     assert "yaw_rate" in capsys.readouterr().out
@@ -81,16 +80,13 @@ def test_compare_shows_a_recording_beside_all_runs(places, tmp_path):
     assert status_of("compare", "fnn_sideslip/25mps", *swaps, *options) == 0
     page = unpacked(tmp_path / "report.html")
     assert "--measured" in page and "--from" in page  # the command that repeats it
-    assert page.replace(" ", "").count(f'"dash":{list(MEASURED_LINE[1])}'.replace(" ", "")) == 1
+    assert page.replace(" ", "").count(DASHED) == 1
     assert status_of("compare", "fnn_sideslip/25mps", *swaps, "--measured", tmp_path / "none.yaml") == 2
-
-
-def test_in_python_a_recording_begins_where_the_run_does(places):
-    assert yb.measured(places[1], start=10.0).time[0] == pytest.approx(0.0)
 
 
 def test_a_malformed_time_is_refused(places, capsys):
     assert status_of("plot", places[0], "--measured", places[1], "--from", "soon") == 2
     assert each_mentions(capsys.readouterr().err, ("--from", "'soon'"))
+    assert yb.measured(places[1], start=10.0).time[0] == pytest.approx(0.0)
     with pytest.raises(ValueError, match="start"):
         yb.measured(places[1], start=float("nan"))

@@ -32,15 +32,13 @@ SIZES = {"cg_to_front_axle": 1.2, "cg_to_rear_axle": 1.5, "track_width": 1.6}
 MU = 0.5
 
 
-def whole_car(gain: float = 1.0, *, mirrored: bool = False, n: int = 801) -> Results:
-    """Return a made-up run with all that an animation can show; `mirrored`: left and right exchanged."""
+def whole_car(gain: float = 1.0, *, n: int = 801) -> Results:
+    """Return a made-up run with all that an animation can show."""
     made = car(gain, n=n)
-    side = -1.0 if mirrored else 1.0
-    columns = {name: values * (side if odd(name) else 1.0) for name, values in made.columns.items()}
+    columns = dict(made.columns)
     steer = columns["driver.steer_angle"]
     for wheel in WHEELS:
-        same = {"l": "r", "r": "l"}[wheel[1]] if mirrored else wheel[1]
-        share = (1.1 if wheel[0] == "f" else 0.9) * (1.2 if same == "l" else 0.8)
+        share = (1.1 if wheel[0] == "f" else 0.9) * (1.2 if wheel[1] == "l" else 0.8)
         columns[f"plant.vertical_load_{wheel}"] = 3000.0 * share * np.ones(n)
         columns[f"tyre.tyre_force_x_{wheel}"] = 200.0 * share * np.ones(n)
         columns[f"tyre.tyre_force_y_{wheel}"] = 20000.0 * share * steer
@@ -50,11 +48,6 @@ def whole_car(gain: float = 1.0, *, mirrored: bool = False, n: int = 801) -> Res
         "tyre": {"name": "tyre_made_up", "constants": {f"friction_{w}": MU for w in WHEELS}},
     }
     return noted(recorded, fmus=fmus)
-
-
-def odd(column: str) -> bool:
-    """Return whether the mirror turns the sign of a quantity."""
-    return bool(re.search(r"steer|sideslip|yaw|acceleration_y|position_y", column))
 
 
 def without(recorded: Results, *parts: str) -> Results:
@@ -82,6 +75,11 @@ def unpacked(page: Path | str) -> str:
         return f">{text}" if place["image"] is None else f' src="data:image/svg+xml,{quote(text)}"'
 
     return re.sub(r'((?P<image>(?<=<img))|) data-packed="(?P<text>[^"]*)"(?(image)|>)', filled, html)
+
+
+def texts(tree: Any, path: str) -> list[str]:
+    """Return what stands at a path of a page, as a reader sees it."""
+    return [" ".join(element.text_content().split()) for element in tree.cssselect(path)]
 
 
 def data_in(html: str) -> dict[str, Any]:

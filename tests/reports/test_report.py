@@ -26,8 +26,8 @@ from tests.reports.flaws import (
     inaccessible,
     looks,
     open_all,
-)
-from tests.reports.made_up import HALF_A_CAR, data_in, unpacked
+)  # fmt: skip
+from tests.reports.made_up import HALF_A_CAR, data_in, texts, unpacked
 from yawbench.foundation.errors import ScenarioError
 from yawbench.metrics.verdict import Status, worded
 from yawbench.reports.overview_page import held
@@ -108,11 +108,6 @@ def paper(tmp_path_factory, fmus):
     )
 
 
-def texts(tree, path: str) -> list[str]:
-    """Return what stands at a path, as a reader sees it."""
-    return [" ".join(element.text_content().split()) for element in tree.cssselect(path)]
-
-
 def test_every_claim_stands_beside_what_was_measured_with_its_verdict(paper):
     rows = paper.tree.cssselect("table.claims > tbody > tr")
     judged = [*paper.record["claims"], *paper.record["checks"]]
@@ -149,19 +144,13 @@ def test_every_figure_of_the_study_is_a_view_of_the_page_and_a_file(paper):
     assert {view["title"] for view in views} > planes
 
 
-def test_the_answer_comes_first_and_a_claim_shows_its_runs(chromium, paper):
+def test_the_page_answers_and_a_claim_shows_its_runs(chromium, paper):
     chromium.open(paper.page)
     chromium.wait_for("document.querySelector('.yv-ready')")
     (answer,) = texts(paper.tree, "p.said")
     claims = paper.record["claims"] or paper.record["checks"]
-    assert answer.startswith(f"Of {len(claims)} ")
     holds = sum(claim["verdict"] == "holds" for claim in claims)
-    assert f"{holds} hold" in answer
-    tops = chromium.run(
-        "return ['p.said', 'table.claims', '.yv', '.yv-chart'].map((name) =>"
-        " document.querySelector(name).getBoundingClientRect().top)"
-    )
-    assert max(tops) < 700
+    assert answer.startswith(f"Of {len(claims)} ") and f"{holds} hold" in answer
     links = paper.tree.cssselect("table.claims a")
     assert len(links) == len(paper.record["claims"]) + len(paper.record["checks"])
     state = "return document.querySelector('.yv').viewer.state"
@@ -224,41 +213,31 @@ def test_only_missing_or_stale_runs_are_made(report, half):
     assert ": 2 runs\n" in said
     assert said.splitlines()[-1].startswith(f"The page: {page}")
     assert mentions(report()[1], "2 runs", "finished")
-    text = (half / "study.yaml").read_text()
-    (half / "study.yaml").write_text(text.replace("amplitude: [0.02, 0.05]", "amplitude: [0.02, 0.05, 0.1]"))
-    assert mentions(report()[1], "3 runs", "2", "finished")
     (half / "half.yaml").write_text(HALF_A_CAR.replace("velocity_x: 20", "velocity_x: 25"))
-    assert ": 3 runs\n" in report()[1]
-    assert ": 3 runs\n" in report("--again")[1]
+    assert ": 2 runs\n" in report()[1]
+    assert ": 2 runs\n" in report("--again")[1]
 
 
-def test_stale_results_are_shown_as_such_where_nothing_may_run(report, half):
-    report()
-    (half / "half.yaml").write_text(HALF_A_CAR.replace("velocity_x: 20", "velocity_x: 25"))
-    assert report("--no-run")[0] == 0
-    tree = html.fromstring(unpacked(Path("results/half/study/report.html")))
-    assert mentions(texts(tree, ".verdict.bad"), "out of date")
-    assert "✗ out of date 2 of 2 runs" in texts(tree, "summary")
-    assert "amplitude/0.02: driver" in tree.text_content()
-
-
-def test_an_edit_after_the_run_does_not_change_where_the_page_says_that_values_come_from(report, half):
+def test_after_an_edit_results_are_shown_as_stale_with_the_values_and_sources_that_they_had(report, half):
     file = half / "half.yaml"
     file.write_text(HALF_A_CAR.replace("friction: 0.7}", "friction: 0.7}  # paper A, table 1"))
     report()
 
-    def parameters():
-        tree = html.fromstring(unpacked(Path("results/half/study/report.html")))
-        return texts(tree, "table.parameters tr")
+    def page():
+        return html.fromstring(unpacked(Path("results/half/study/report.html")))
 
-    before = parameters()
+    before = texts(page(), "table.parameters tr")
     assert any("paper A, table 1" in row for row in before)
     file.write_text(HALF_A_CAR.replace("friction: 0.7}", "friction: 0.7}  # chosen: a guess"))
     assert report()[0] == 0
-    assert parameters() == before
+    assert texts(page(), "table.parameters tr") == before
     file.write_text(HALF_A_CAR.replace("velocity_x: 20, friction: 0.7", "velocity_x: 25, friction: 0.5"))
     assert report("--no-run")[0] == 0
-    assert parameters() == before
+    tree = page()
+    assert texts(tree, "table.parameters tr") == before
+    assert mentions(texts(tree, ".verdict.bad"), "out of date")
+    assert "✗ out of date 2 of 2 runs" in texts(tree, "summary")
+    assert "amplitude/0.02: driver" in tree.text_content()
 
 
 def test_a_run_that_failed_is_named_and_its_claims_are_not_judged(report, half):

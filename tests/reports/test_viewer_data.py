@@ -56,6 +56,7 @@ def test_any_shape_of_signal_survives(scale):
         "far": 1e6 + RNG.normal(size=500),
         "flag": RNG.integers(0, 2, 500).astype(bool),
         "count": RNG.integers(0, 9, 500),
+        "often nothing": np.where(np.arange(500) % 3 == 0, 0.0, RNG.normal(size=500)),
     }
     run = made(
         **{name: values * scale if values.dtype.kind == "f" else values for name, values in shapes.items()}
@@ -65,12 +66,7 @@ def test_any_shape_of_signal_survives(scale):
         values = np.asarray(values, float)
         error = np.max(np.abs(unpacked(packed, name) - values))
         assert error <= 0.5 * np.ptp(values) / COARSE * (1 + 1e-6) + 1e-15 * np.max(np.abs(values)), name
-
-
-def test_zero_is_exactly_zero():
-    values = np.where(np.arange(500) % 3 == 0, 0.0, RNG.normal(size=500))
-    (packed,) = pack([made(moment=values)])
-    assert np.all(unpacked(packed, "plant.moment")[::3] == 0.0)
+    assert np.all(unpacked(packed, "plant.often nothing")[::3] == 0.0)
 
 
 def test_a_difference_of_close_runs_is_no_rounding():
@@ -117,12 +113,6 @@ def test_constants_and_both_ends_of_a_wire_cost_nothing():
     np.testing.assert_array_equal(unpacked(two, "plant.b"), unpacked(two, "plant.a"))
 
 
-def test_text_columns_are_left_out():
-    run = made(x=np.zeros(500))
-    words = replace(run, columns={**run.columns, "plant.mode": np.array(["on"] * 500, dtype=object)})
-    assert set(pack([words])[0].columns) == {"plant.x"}
-
-
 def test_even_and_uneven_times():
     even = made(x=np.zeros(500))
     np.testing.assert_allclose(unpacked(pack([even])[0], "time"), even.time, rtol=1e-15)
@@ -131,14 +121,12 @@ def test_even_and_uneven_times():
     np.testing.assert_allclose(unpacked(packed, "time"), uneven.time, rtol=0.0, atol=5.0 / EXACT)
 
 
-def test_a_part_of_the_columns_is_packed_without_packing_again():
+def test_a_part_of_the_columns_is_packed_without_packing_again_and_texts_are_left_out():
     run = whole_car()
-    (whole,) = pack([run])
+    words = {"plant.mode": np.array(["on"] * run.time.size, dtype=object)}
+    (whole,) = pack([replace(run, columns=run.columns | words)])
+    assert whole.columns.keys() == run.columns.keys() and [whole] == pack([run])
     part = whole.only({"plant.sideslip", "plant.yaw_rate"})
     assert set(part.header["columns"]) == {"plant.sideslip", "plant.yaw_rate"}
     assert len(part.block) < len(whole.block) / 2
     np.testing.assert_array_equal(unpacked(part, "plant.yaw_rate"), unpacked(whole, "plant.yaw_rate"))
-
-
-def test_packing_is_repeatable():
-    assert pack([whole_car()]) == pack([whole_car()])

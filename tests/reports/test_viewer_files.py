@@ -1,4 +1,4 @@
-"""What the viewer saves, what it draws of hidden runs, and the digits and signals that it knows."""
+"""What the viewer saves, what it draws of hidden runs, and the digits that it knows."""
 
 from __future__ import annotations
 
@@ -10,20 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.reports.browser import Browser
 from tests.reports.made_up import whole_car
+from tests.reports.test_viewer import VIEWER, opened, written
 from yawbench.figures.panels import LabelledRun
-from yawbench.reports.viewer import Settings, page
 from yawbench.reports.viewer_data import COARSE
 from yawbench.reports.viewer_views import Bound, Mark, View
 
-VIEWER = "const viewer = document.querySelector('.yv').viewer;"
 A, B, C = "no control", "fuzzy, new", "third/law"
-ADD = (
-    VIEWER + "const add = document.querySelector('.yv-add'); add.value = arguments[0];"
-    "add.dispatchEvent(new Event('change'));"
-    "return [viewer.state.panels.at(-1), add.validationMessage, viewer.state.panels.length];"
-)
 SAVED = (
     VIEWER + "const names = [], create = document.createElement.bind(document);"
     "document.createElement = (tag) => { const one = create(tag); if (tag === 'a') {"
@@ -50,19 +43,11 @@ def tiny(results, size: float = 1e-7):
 @pytest.fixture(scope="module")
 def three(tmp_path_factory) -> Path:
     """A page of three runs; the second has instants and limits of its own."""
-    file = tmp_path_factory.mktemp("files") / "three.html"
     runs = [LabelledRun(A, whole_car()), LabelledRun(B, whole_car(2.0)), LabelledRun(C, tiny(whole_car(0.5)))]
-    settings = Settings(
-        [View(panels=("sideslip", "yaw_rate"))],
+    return written(
+        tmp_path_factory.mktemp("files"), *runs, views=[View(panels=("sideslip", "yaw_rate"))],
         marks=[Mark(1.0, "beginning", 1)], limits=[Bound("yaw_rate", 9.0, "too much", 1)],
     )  # fmt: skip
-    file.write_text(page(runs, settings), "utf-8")
-    return file
-
-
-def opened(chromium: Browser, file: Path, fragment: str = "") -> None:
-    chromium.open(file, fragment)
-    chromium.wait_for("document.querySelector('.yv-ready')")
 
 
 def test_files_of_runs_are_named_by_the_page_alone(chromium, three):
@@ -72,7 +57,7 @@ def test_files_of_runs_are_named_by_the_page_alone(chromium, three):
     assert words[:3] == [A, B, C] and not any("minus" in text for text in words)
 
 
-@pytest.mark.parametrize("shown", [[0, 1], [0, 1, 2], [1, 2]])
+@pytest.mark.parametrize("shown", [[0, 1, 2], [1, 2]])
 def test_files_of_a_difference_say_so(shown, chromium, three):
     opened(chromium, three, f"run?difference=true&shown={shown}".replace(" ", ""))
     drawn = [label for k, label in enumerate((A, B, C)) if k in shown and k]
@@ -106,20 +91,24 @@ DASHED = (
 )
 
 
-def test_hiding_a_run_takes_its_instants_and_limits_along(chromium, three):
+def test_hiding_a_run_takes_its_lines_car_instants_and_limits_along(chromium, three):
     opened(chromium, three)
+    drawn = VIEWER + "return viewer.panels[1].shown.filter((one) => !one.reference).map(({run}) => run.label)"
+    assert chromium.run(drawn) == [A, B, C]
     count, high = chromium.run(DASHED)
     assert count == 2 and high > np.degrees(9.0)
     chromium.run("document.querySelectorAll('.yv-show')[1].click()")
     count, high = chromium.run(DASHED)
     assert count == 0 and high < np.degrees(9.0)
+    assert chromium.run(drawn) == [A, C]
+    assert chromium.run("return document.querySelectorAll('.yv-closeups figure').length") == 2
     chromium.run("document.querySelectorAll('.yv-show')[1].click()")
     assert chromium.run(DASHED)[0] == 2
 
 
 AT = VIEWER + (
-    "viewer.state.time = arguments[0]; viewer.moveCursor();"
-    "return [...viewer.panels[0].body.rows].map((row) => row.cells[1].textContent);"
+    "return arguments[0].flatMap((time) => { viewer.state.time = time; viewer.moveCursor();"
+    "return [...viewer.panels[0].body.rows].map((row) => row.cells[1].textContent); });"
 )
 
 
@@ -132,47 +121,10 @@ def test_values_at_the_cursor_have_no_digits_finer_than_the_samples(fragment, ch
               for name in ("plant.sideslip", "plant.yaw_rate")]  # fmt: skip
     times = whole_car().time
     step = np.degrees(ranges[0]) / COARSE
-    many = [chromium.run(AT, float(t)) for t in times[times > 0.6 * times[-1]][::40]]
-    texts = [text for row in many for text in row if text not in ("–", "0")]
+    cells = chromium.run(AT, times[times > 0.6 * times[-1]][::40].tolist())
+    texts = [text for text in cells if text not in ("–", "0")]
     assert texts
     for text in texts:
         decimals = len(text.partition(".")[2].partition("e")[0])
         unit = 10.0 ** (int((text.partition("e")[2] or "0").replace("−", "-")) - decimals)
         assert unit >= 0.99 * step, text
-
-
-@pytest.mark.parametrize(
-    ("text", "signal"),
-    [
-        ("plant.velocity_x", "plant.velocity_x"),
-        ("Longitudinal velocity", "plant.velocity_x"),
-        ("longitudinal velocity in km/h", "plant.velocity_x"),
-        ("velocity_x", "plant.velocity_x"),
-        (" YAW_MOMENT ", "controller.yaw_moment"),
-        ("plant.sideslip - reference.sideslip_ref", "plant.sideslip - reference.sideslip_ref"),
-        ("plant.velocity_x, yaw_moment", "plant.velocity_x,controller.yaw_moment"),
-    ],
-)
-def test_signals_are_added_by_name_variable_or_label(text, signal, chromium, three):
-    opened(chromium, three)
-    assert chromium.run(ADD, text)[:2] == [signal, ""]
-
-
-def test_what_is_not_one_signal_is_answered(chromium, three, tmp_path):
-    opened(chromium, three)
-    _, several, panels = chromium.run(ADD, "tyre_force_x")
-    assert panels == 2 and "tyre.tyre_force_x_fl" in several and "tyre.tyre_force_x_rr" in several
-    _, none, panels = chromium.run(ADD, "plant.nothing")
-    assert panels == 2 and "plant.nothing" in none and "recorded" in none
-    axis = (
-        VIEWER + "const x = document.querySelector('.yv-x'); x.value = arguments[0];"
-        "x.dispatchEvent(new Event('change')); return [viewer.state.x, x.validationMessage];"
-    )
-    assert chromium.run(axis, "velocity_x") == ["plant.velocity_x", ""]
-    chosen, none = chromium.run(axis, "plant.nothing")
-    assert chosen == "plant.velocity_x" and "plant.nothing" in none
-    some = page([LabelledRun(A, whole_car())], Settings([View(panels=["sideslip"])], largest=1))
-    (tmp_path / "some.html").write_text(some, "utf-8")
-    opened(chromium, tmp_path / "some.html")
-    _, left_out, _ = chromium.run(ADD, "acceleration_y")
-    assert "acceleration_y" in left_out and "yawbench plot --page" in left_out

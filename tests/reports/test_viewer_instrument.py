@@ -17,14 +17,14 @@ from tests.orchestrator.recorded import noted, write
 from tests.refusals import mentions
 from tests.reports.browser import PHONE, Browser
 from tests.reports.made_up import data_in, whole_car
-from tests.reports.test_viewer import VIEWER, chart, drag, opened
+from tests.reports.test_viewer import VIEWER, chart, drag, opened, written
 from yawbench.events.kinds import events_in
 from yawbench.figures import plots
 from yawbench.figures.panels import LabelledRun
 from yawbench.figures.plots import draw
 from yawbench.orchestrator.results.reader import Results
 from yawbench.reports.planes import PLANES
-from yawbench.reports.viewer import LEAST, Settings, page
+from yawbench.reports.viewer import LEAST
 from yawbench.reports.viewer_views import Mark, View
 from yawbench.vocabulary.gravity import G
 
@@ -41,18 +41,17 @@ def spun() -> Results:
 @pytest.fixture(scope="module")
 def three(tmp_path_factory) -> Path:
     """A page of three runs; the first is lost."""
-    file = tmp_path_factory.mktemp("instrument") / "three.html"
     runs = [LabelledRun(A, spun()), LabelledRun(B, whole_car(2.0)), LabelledRun(C, whole_car(0.5))]
-    settings = Settings([View(panels=SHOWN)], marks=[Mark(1.0, "begin of B", 1)])
-    file.write_text(page(runs, settings), "utf-8")
-    return file
+    settings = {"views": [View(panels=SHOWN)], "marks": [Mark(1.0, "begin of B", 1)]}
+    return written(tmp_path_factory.mktemp("instrument"), *runs, **settings)
 
 
 STATE = VIEWER + "viewer.remember(); return viewer.state"
 
 
 def test_time_axis_and_cursor_time_stay_in_sight(chromium: Browser, three):
-    for width, height in ((1400, 500), (PHONE, 500)):
+    height = 500
+    for width in (1400, PHONE):
         opened(chromium, three, width=width, height=height)
         boxes = chromium.run(
             VIEWER + "viewer.panels[1].root.scrollIntoView({block: 'center', behavior: 'instant'});"
@@ -213,8 +212,7 @@ def test_a_claim_shows_its_signal_with_bound_and_instant(chromium: Browser, thre
 def test_every_run_has_its_own_reference(chromium: Browser, tmp_path):
     first, second = whole_car(), whole_car(2.0)
     second.columns["reference.yaw_rate_ref"] = 1.5 * second["reference.yaw_rate_ref"]
-    (file := tmp_path / "own.html").write_text(page([LabelledRun(A, first), LabelledRun(B, second)]), "utf-8")
-    opened(chromium, file)
+    opened(chromium, written(tmp_path, first, second))
     drawn = VIEWER + (
         "const panel = viewer.panels.find(({spec}) => spec.startsWith('plant.' + arguments[0]));"
         "return panel.shown.filter(({reference}) => reference).map(({run}) => run.number)"
@@ -236,8 +234,10 @@ def test_the_picture_as_svg_has_titles_axis_legend_and_a_line_per_run(chromium: 
 COMMAND = VIEWER + "viewer.tellCommand(); return viewer.find('command').textContent"
 
 
-def saved(folder: Path) -> list[LabelledRun]:
-    """Return three runs that are recorded below a folder, one in a folder whose name has a space."""
+@pytest.fixture(scope="module")
+def saved(tmp_path_factory) -> list[LabelledRun]:
+    """Three runs that are recorded, in folders whose names have a space."""
+    folder = tmp_path_factory.mktemp("saved")
     runs = [
         LabelledRun(label, replace(whole_car(k + 1.0), folder=folder / f"run {k}"))
         for k, label in enumerate((A, B, C))
@@ -245,6 +245,12 @@ def saved(folder: Path) -> list[LabelledRun]:
     for run in runs:
         write(run.results, run.results.folder)
     return runs
+
+
+@pytest.fixture(scope="module")
+def recorded(saved, tmp_path_factory) -> Path:
+    """Their page."""
+    return written(tmp_path_factory.mktemp("recorded"), *saved)
 
 
 @pytest.mark.parametrize(
@@ -259,10 +265,8 @@ def saved(folder: Path) -> list[LabelledRun]:
          {"plant.yaw_rate(plant.sideslip)": [A, B]}),
     ],
 )  # fmt: skip
-def test_the_command_draws_the_view(chromium: Browser, tmp_path, monkeypatch, view, panels):
-    runs = saved(tmp_path)
-    (file := tmp_path / "three.html").write_text(page(runs), "utf-8")
-    opened(chromium, file, f"run?{view}")
+def test_the_command_draws_the_view(chromium: Browser, recorded, tmp_path, monkeypatch, view, panels):
+    opened(chromium, recorded, f"run?{view}")
     shown = chromium.run(
         VIEWER + "return viewer.panels.map(({meaning: {factor}, drawn}) => drawn.filter(({run, reference}) =>"
         " viewer.shows(run) && !reference).map(({values}) => { const own = [...values].map((v) => v * factor)"
@@ -289,20 +293,17 @@ def test_the_command_draws_the_view(chromium: Browser, tmp_path, monkeypatch, vi
                 assert (y[0], y[-1]) == pytest.approx((first, last), rel=1e-3, abs=1e-4), name
 
 
-def test_a_view_that_figures_have_not_has_no_command(chromium: Browser, tmp_path):
-    (file := tmp_path / "three.html").write_text(page(saved(tmp_path)), "utf-8")
+def test_a_view_that_figures_have_not_has_no_command(chromium: Browser, recorded):
     for view in ('x="distance"', 'x="plant.sideslip"&difference=true'):
-        opened(chromium, file, f"run?{view}")
+        opened(chromium, recorded, f"run?{view}")
         assert chromium.run(COMMAND) == "", view
 
 
 def test_a_judged_signal_that_the_page_does_not_carry_is_named_with_the_command_that_shows_it(
-    chromium: Browser, tmp_path
+    chromium: Browser, saved, tmp_path
 ):
-    runs, lost = saved(tmp_path), "plant.acceleration_y"
-    (file := tmp_path / "three.html").write_text(
-        page(runs, Settings([View(panels=["sideslip"])], largest=LEAST))
-    )
+    lost = "plant.acceleration_y"
+    file = written(tmp_path, *saved, views=[View(panels=["sideslip"])], largest=LEAST)
     opened(chromium, file, f'run?shown=[1]&lit=["{lost}",2.5,"peak ≤ 2.5 m/s²"]')
     told = "document.querySelector('.yv-missing')"
     assert mentions(chromium.run(f"return {told}.textContent"), lost, "peak ≤ 2.5 m/s²")
@@ -314,16 +315,15 @@ def test_a_judged_signal_that_the_page_does_not_carry_is_named_with_the_command_
 
 
 def test_phase_planes_have_their_limits(chromium: Browser, tmp_path):
-    plant = {"name": "plant", "constants": {}}
-    tyre = {"name": "tyre", "constants": {"friction": 0.5}}
-    run = noted(whole_car(), fmus={"plant": plant, "tyre": tyre})
-    (file := tmp_path / "planes.html").write_text(page([LabelledRun(A, run)]), "utf-8")
-    opened(chromium, file)
-    titles = chromium.run(VIEWER + "return viewer.data.views.map(({title}) => title)")
-    number = titles.index(PLANES[1].title)
-    chromium.run(VIEWER + f"viewer.find('views').value = {number};"
-                 "viewer.find('views').dispatchEvent(new Event('change'))")  # fmt: skip
-    curves = chromium.run(VIEWER + "return viewer.curves('plant.yaw_rate').map(([, , ys]) => ys[0])")
+    run = noted(whole_car(), fmus={"tyre": {"name": "tyre", "constants": {"friction": 0.5}}})
+    opened(chromium, written(tmp_path, run))
+    curves = chromium.run(
+        VIEWER + "const views = viewer.find('views');"
+        "views.value = viewer.data.views.findIndex(({title}) => title === arguments[0]);"
+        "views.dispatchEvent(new Event('change'));"
+        "return viewer.curves('plant.yaw_rate').map(([, , ys]) => ys[0])",
+        PLANES[1].title,
+    )
     held = 0.5 * G / float(run["plant.velocity_x"][0])
     assert sorted(curves) == pytest.approx([-held, held])
     assert chromium.console() == []

@@ -111,7 +111,8 @@ def test_quaternions_turn_the_nose_down_and_the_left_side_up():
 
 
 def test_run_json_has_lanes_and_ground_as_geometry(tmp_path):
-    assert status_of("run", "scenarios/proving_ground/iso_3888_2.yaml", "--out", tmp_path / "lanes") == 0
+    for name, scenario in (("lanes", "proving_ground/iso_3888_2"), ("split", "road/split_braking")):
+        assert status_of("run", scenario, "--set", "stop_time=0.5", "--out", tmp_path / name) == 0
     record = json.loads((tmp_path / "lanes/run.json").read_text())
     driver = record["fmus"]["driver"]
     lanes = lanes_of({**driver["defaults"], **driver["parameters"]})
@@ -119,7 +120,6 @@ def test_run_json_has_lanes_and_ground_as_geometry(tmp_path):
     scene = yb.open(tmp_path / "lanes").scene()
     assert list(scene.places.lanes) == lanes
     assert {y for x, y in scene.places.cones if x < lanes[1].start} == {lanes[0].left, lanes[0].right}
-    assert status_of("run", "scenarios/road/split_braking.yaml", "--out", tmp_path / "split") == 0
     split = yb.open(tmp_path / "split")
     ground = json.loads((tmp_path / "split/run.json").read_text())["geometry"]["ground"]
     assert [[*map(tuple, piece["corners"])] for piece in ground] == [
@@ -129,7 +129,7 @@ def test_run_json_has_lanes_and_ground_as_geometry(tmp_path):
 
 
 def test_events_and_the_path_of_the_driver_are_in_the_scene():
-    run = yb.load("proving_ground/iso_3888_2").run()
+    run = yb.load("proving_ground/iso_3888_2").set({"stop_time": 4.0}).run()
     scene = run.scene()
     assert len(scene.events) == len(run.events.rows) > 0
     offset = scene.position[:, 1] - scene.path[:, 1]

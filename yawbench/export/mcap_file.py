@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.colors import to_hex
 
 from yawbench.events.why import sentence
 from yawbench.foundation.safe_files import write_whole
@@ -305,7 +306,7 @@ def _layout(runs: Sequence[ExportedRun], scene: bool) -> dict[str, Any]:
                 "value": _message_path(run.label, column),
                 "label": run.label,
                 "enabled": True,
-                "color": "#" + "".join(f"{round(255 * part):02x}" for part in colour_of(number)),
+                "color": to_hex(colour_of(number)),
                 "timestampMethod": "receiveTime",
             }
             for number, run in enumerate(runs)
@@ -330,7 +331,7 @@ def _layout(runs: Sequence[ExportedRun], scene: bool) -> dict[str, Any]:
         "followMode": "follow-pose",
         "followTf": first,
         "cameraState": {"distance": 12, "phi": 60, "thetaOffset": 90, "perspective": True, "fovy": 45},
-        "scene": {"backgroundColor": "#" + "".join(f"{round(255 * part):02x}" for part in ASPHALT)},
+        "scene": {"backgroundColor": to_hex(ASPHALT)},
         "topics": {"/scene": {"visible": True}},
         "layers": {"grid": {"layerId": "foxglove.Grid", "frameId": WORLD, "size": 200, "divisions": 20}},
     }

@@ -50,8 +50,7 @@ def strip_of(scene: Scene, points: np.ndarray, height: float) -> np.ndarray:
 
 def colour_of(number: int) -> Colour:
     """Return the colour of a run by its number, as figures have it."""
-    r, g, b = to_rgb(line_style(number)["color"])
-    return r, g, b
+    return to_rgb(line_style(number)["color"])
 
 
 def ground_colour(friction: float) -> Colour:
