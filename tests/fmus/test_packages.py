@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from tests.commands.test_batch_commands import SCENARIO
+from tests.fmus.test_rebuild_stale import without_native_libraries
 from tests.refusals import each_mentions, mentions
 from yawbench.fmus import opener
 from yawbench.fmus.opener import HOME
@@ -37,23 +38,10 @@ class Follow(Component):
 Install = Callable[..., Path]
 
 
-@pytest.fixture(scope="module")
-def shared(tmp_path_factory) -> Path:
-    """A cache for all tests: what is compiled of the sample is the same in most."""
-    return tmp_path_factory.mktemp("cache")
-
-
-@pytest.fixture
-def cache(shared, monkeypatch) -> Path:
-    """A cache without FMUs, in place of the user's."""
-    shutil.rmtree(shared / "fmus", ignore_errors=True)
-    monkeypatch.setenv("YAWBENCH_CACHE", str(shared))
-    return shared
-
-
 @pytest.fixture
 def install(tmp_path, monkeypatch, cache) -> Iterator[Install]:
     """Install a sample package, as an installer would leave it on Python's path."""
+    without_native_libraries(monkeypatch)
     site = tmp_path / "site"
     site.mkdir()
     monkeypatch.syspath_prepend(site)
