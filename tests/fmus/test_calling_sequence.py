@@ -105,23 +105,26 @@ def test_another_guid_is_refused_with_a_sentence(fmu_of, name, runs_as):
 
 
 def test_calls_out_of_order_are_refused_and_change_nothing(unit):
-    step = "fmi2DoStep", ctypes.c_double(0.0), ctypes.c_double(H), 1
-    set_up = "fmi2SetupExperiment", 0, *[ctypes.c_double(0.0)] * 2, 0, ctypes.c_double(0.0)
-    after = {
-        None: (step, ("fmi2ExitInitializationMode",)),
-        "fmi2EnterInitializationMode": (step, ("fmi2EnterInitializationMode",), set_up),
-        "fmi2ExitInitializationMode": (set_up,),
-        "fmi2Terminate": (step, ("fmi2Terminate",)),
-    }
-    for reached, calls in after.items():
-        if reached == "fmi2Terminate":
-            unit.step(0.0, H)
-        if reached:
-            unit.do(reached)
-        for call in calls:
-            said = refusal(unit, *call)
-            ended = "terminated" if reached == "fmi2Terminate" and call == step else ""
-            assert mentions(said, call[0], ended or ("initialization" if reached != "fmi2Terminate" else ""))
+    zero = ctypes.c_double(0.0)
+    step, set_up = (
+        ("fmi2DoStep", zero, ctypes.c_double(H), 1),
+        ("fmi2SetupExperiment", 0, zero, zero, 0, zero),
+    )
+    enter, leave, end = (
+        f"fmi2{call}" for call in ("EnterInitializationMode", "ExitInitializationMode", "Terminate")
+    )
+    initialization = "initialization"
+    for passed, refused in (
+        ((), [(step, initialization), ((leave,), initialization)]),
+        ((enter,), [(step, initialization), ((enter,), initialization), (set_up, initialization)]),
+        ((leave,), [(set_up, initialization)]),
+        (step, []),
+        ((end,), [(step, "terminated"), ((end,), "")]),
+    ):
+        if passed:
+            unit.do(*passed)
+        for call, named in refused:
+            assert mentions(refusal(unit, *call), call[0], named)
     unit.outputs()
     unit.do("fmi2Reset")
     started(unit)
