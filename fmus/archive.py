@@ -28,7 +28,6 @@ import zipfile
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
 
 from yawbench.foundation.cache import STORES, cache_folders, delete_unused, hold
 from yawbench.foundation.errors import ModelDescriptionError
@@ -153,30 +152,19 @@ def _read_member(path: Path) -> bytes:
 
 
 def _load(entry: Path, path: Path) -> Fmu | None:
-    """Return the FMU of a cache entry, None if there is none or it is damaged."""
-    record = _whole_entry(entry)
-    if record is None:
-        return None
+    """Return the FMU of a cache entry, None if one of its files is missing or has changed."""
     try:
-        fmu = fmu_description.from_record(record["fmu"], path=path, directory=entry / "fmu")
-    except (ValueError, KeyError, TypeError, AttributeError):
-        return None
-    with contextlib.suppress(OSError):  # a read-only cache is maintained by others
-        os.utime(entry)
-    return fmu
-
-
-def _whole_entry(entry: Path) -> dict[str, Any] | None:
-    """Return the record of a cache entry, None if one of its files is missing or has changed."""
-    try:
-        record: dict[str, Any] = json.loads((entry / "description.json").read_bytes())
+        record = json.loads((entry / "description.json").read_bytes())
         for name, digest in record["files"].items():
             with open(f"{entry}/fmu/{name}", "rb", buffering=0) as file:
                 if hashlib.sha256(file.read()).hexdigest() != digest:
                     return None
-        return record
+        fmu = fmu_description.from_record(record["fmu"], path=path, directory=entry / "fmu")
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
         return None
+    with contextlib.suppress(OSError):  # a read-only cache is maintained by others
+        os.utime(entry)
+    return fmu
 
 
 def _unpack(raw: bytes, entry: Path, path: Path) -> Fmu:

@@ -72,12 +72,9 @@ class BuildStamp:
 
     def to_comment(self) -> bytes:
         """Return the stamp as the comment of an archive."""
-        content = {key: value for key, value in asdict(self).items() if value}
-        plain = asdict(PLAIN)
-        content["edition"] = {key: v for key, v in content["edition"].items() if v != plain[key]}
-        if not content["edition"]:
-            del content["edition"]
-        return _SIGN + json.dumps(content, sort_keys=True).encode()
+        edition = {key: v for key, v in asdict(self.edition).items() if v != getattr(PLAIN, key)}
+        content = asdict(self) | {"edition": edition}
+        return _SIGN + json.dumps({key: v for key, v in content.items() if v}, sort_keys=True).encode()
 
 
 def read_stamp(fmu: Path) -> BuildStamp | None:

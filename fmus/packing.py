@@ -46,13 +46,8 @@ def pack(
     """
     files = {f"resources/{path}": text.encode() for path, text in sorted(resources.items())}
     description.set("version", version)
-    description.set("guid", "")
-    content = hashlib.sha256(ElementTree.tostring(description))
-    for path, data in files.items():
-        content.update(path.encode() + b"\0" + hashlib.sha256(data).digest())
-    guid = f"{{{uuid.UUID(bytes=content.digest()[:16])}}}"
-    description.set("guid", guid)
-    files["resources/guid.txt"] = guid.encode()  # for the launcher, which refuses any other
+    # for the launcher, which refuses any other
+    files["resources/guid.txt"] = set_guid(description, files).encode()
     ElementTree.indent(description)
     files[DESCRIPTION] = ElementTree.tostring(description, encoding="UTF-8", xml_declaration=True) + b"\n"
     for library in LIBRARIES:
@@ -62,6 +57,17 @@ def pack(
         files[f"binaries/linux64/{PYTHONFMU_LIBRARY}"] = files[binary]
         files[binary] = launcher
     return files
+
+
+def set_guid(description: Element, files: Mapping[str, bytes]) -> str:
+    """Give a model description the GUID that follows from it and from files, and return the GUID."""
+    description.set("guid", "")
+    content = hashlib.sha256(ElementTree.tostring(description))
+    for path, data in files.items():
+        content.update(path.encode() + b"\0" + hashlib.sha256(data).digest())
+    guid = f"{{{uuid.UUID(bytes=content.digest()[:16])}}}"
+    description.set("guid", guid)
+    return guid
 
 
 def to_bytes(files: Mapping[str, bytes], stamp: BuildStamp) -> bytes:

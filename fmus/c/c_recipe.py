@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import hashlib
 import sys
-import uuid
 from dataclasses import dataclass
 from pathlib import Path
 from xml.etree import ElementTree
@@ -21,7 +20,7 @@ from ..build_stamp import PLAIN, Edition
 from ..compiler import compile_library, compiler_command, compiler_version, libraries_for
 from ..description import platform
 from ..native.build import HEADERS as COMMON
-from ..packing import DESCRIPTION
+from ..packing import DESCRIPTION, set_guid
 from ..presentation import PAGE, icon
 from ..recipe import Made, wanted_platforms
 from ..source_archive import source_files
@@ -115,8 +114,7 @@ class CRecipe:
             raise BuildError(f"{self.source} contains no C file")
         role = ROLES[self.source.parent.name]
         root, variables = read_declaration(description.read_bytes(), self.name, role)
-        root.set("guid", _guid(root, sources))
-        made = headers(variables, root.get("guid", ""))
+        made = headers(variables, set_guid(root, sources))
         sources |= {name: text.encode() for name, text in made.items()}
         sources |= {header.name: header.read_bytes() for header in HEADERS}
         arguments = [*FLAGS, *c_files, "-lm"]
@@ -132,11 +130,3 @@ class CRecipe:
         if edition.sources:
             files |= source_files(sources, c_files, self.name, EXACT)
         return Made(files, later=hurry and bool(edition.platforms))
-
-
-def _guid(root: ElementTree.Element, sources: dict[str, bytes]) -> str:
-    root.set("guid", "")
-    content = hashlib.sha256(ElementTree.tostring(root))
-    for name, data in sources.items():
-        content.update(name.encode() + b"\0" + hashlib.sha256(data).digest())
-    return f"{{{uuid.UUID(bytes=content.digest()[:16])}}}"

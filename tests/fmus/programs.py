@@ -9,7 +9,7 @@ import re
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from functools import lru_cache
 from pathlib import Path
 
@@ -17,17 +17,34 @@ import pytest
 
 from tests.fmus.bare import Fmu, Unit
 from tests.fmus.plausible import plausible
+from yawbench.commands.new import Language, begin
 from yawbench.fmus.build import HERE as FMUS
-from yawbench.fmus.compiler import TO_WINDOWS, compiler_for
+from yawbench.fmus.compiler import MINGW, TO_WINDOWS, compiler_for
 
 WINE = shutil.which("wine64") or next(map(str, Path("/usr/lib/wine").glob("wine64")), None)
-in_windows = pytest.mark.skipif(
+_OF_WINDOWS = pytest.mark.skipif(
     WINE is None or compiler_for(TO_WINDOWS) is None, reason="needs Wine and a cross compiler"
 )
+
+
+def in_windows(test: Callable[..., None]) -> Callable[..., None]:
+    """Mark a test that needs Wine; of the second tier if Zig compiles: it first makes Windows' runtime."""
+    return _OF_WINDOWS(test if shutil.which(MINGW) else pytest.mark.exhaustive(test))
+
+
 MINORS = (10, 11, 12, 13)
 """Minor versions of Python 3 that are supported."""
 OURS_FIRST = sorted(MINORS, key=lambda minor: minor != sys.version_info.minor)
 """The same, ours first; whether they are installed is asked in a test: it takes a process each."""
+
+
+def begun(folder: Path, kind: str = "controller", language: Language = "c") -> Path:
+    """Write what `yawbench new` begins with, by default a controller in C, and return the folder of that."""
+    for path, text in begin(kind, "idea", language, in_checkout=language == "c").files.items():
+        file = folder / path
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(text)
+    return folder / "components" / "controllers" / "idea"
 
 
 def unpacked_inputs(folder: Path) -> dict[str, float]:
@@ -52,13 +69,9 @@ def run(command: list[str], empty: Path, **environment: str) -> subprocess.Compl
 def expected_outputs(folder: Path) -> list[float]:
     """Return what the FMU gives in this very process."""
     fmu = Fmu(folder)
-    unit = Unit(fmu, **unpacked_inputs(folder))
-    unit.start()
-    for k in range(10):
-        unit.step(k * 0.001)
-    outputs = unit.outputs()
-    unit.free()
-    return outputs
+    reals = [name for name, kind in fmu.type.items() if kind == "Real"]
+    last = dict(zip(reals, ten_steps(fmu, unpacked_inputs(folder))[-1], strict=True))
+    return [last[name] for name in fmu.names("output")]
 
 
 def host_outputs(done: subprocess.CompletedProcess[str], folder: Path) -> list[float]:
@@ -81,7 +94,8 @@ def in_wine(
     source = Path(__file__).with_name("host_windows.c")
     compiler = compiler_for(TO_WINDOWS)
     assert compiler is not None
-    subprocess.run([*compiler[0], f"-I{FMUS}", source, "-o", host], check=True)
+    command, flags = compiler  # those of libraries: Zig makes a runtime for every level of optimization
+    subprocess.run([*command, *flags, f"-I{FMUS}", source, "-o", host], check=True)
     lines, sizes = [], []
     for fmu, inputs in units:
         library = next((fmu.folder / "binaries" / "win64").glob("*.dll"))
@@ -120,46 +134,27 @@ def ten_steps(fmu: Fmu, inputs: dict[str, float]) -> list[list[float]]:
 
 
 @lru_cache
-def python_libraries() -> dict[str, str]:
-    """Return version -> libpython of every Python of 3.10 to 3.13 on this machine.
-
-    Found by asking each `python3.<n>` on PATH, in the folders of pyenv, and what
-    YAWBENCH_TEST_LIBPYTHONS lists (separated by colons).
-    """
-    found: dict[str, str] = {}
-    candidates = [f for f in os.environ.get("YAWBENCH_TEST_LIBPYTHONS", "").split(":") if f]
+def pythons(minor: int) -> dict[str, str]:
+    """Return interpreter -> libpython of every Python 3.`minor` on PATH, in /usr/bin or of pyenv."""
+    found = {}
+    name = f"python3.{minor}"
+    asked = (
+        "import sys, sysconfig as s; print(sys.executable, *map(s.get_config_var, ('LIBDIR', 'INSTSONAME')))"
+    )
     pyenv = Path(os.environ.get("PYENV_ROOT", Path.home() / ".pyenv"))
-    candidates += map(str, sorted(pyenv.glob("versions/3.*/lib/libpython3.*.so.1.0")))
-    for minor in MINORS:
-        for interpreter in {
-            shutil.which(f"python3.{minor}"),
-            shutil.which(f"python3.{minor}", path="/usr/bin"),
-        }:
-            if interpreter:
-                asked = (
-                    "import sysconfig as s; print(s.get_config_var('LIBDIR'), s.get_config_var('INSTSONAME'))"
-                )
-                answer = subprocess.run(
-                    [interpreter, "-c", asked], capture_output=True, text=True, check=False
-                )
-                candidates.append("/".join(answer.stdout.split()))
-    for file in candidates:
-        version = re.search(r"libpython(3\.\d+)\.so", file)
-        if version and int(version[1][2:]) in MINORS and os.path.exists(file):
-            found.setdefault(f"{version[1]} {file}", file)
+    candidates = [shutil.which(name), shutil.which(name, path="/usr/bin")]
+    candidates += map(str, sorted(pyenv.glob(f"versions/3.{minor}.*/bin/{name}")))
+    for interpreter in dict.fromkeys(filter(None, candidates)):
+        answer = subprocess.run([interpreter, "-c", asked], capture_output=True, text=True, check=False)
+        if answer.returncode == 0:
+            executable, folder, library = answer.stdout.split()
+            found[os.path.realpath(executable)] = f"{folder}/{library}"
     return found
 
 
-def interpreters(minor: int) -> list[str]:
-    """Return every different Python 3.`minor` on PATH, in /usr/bin or in the folders of pyenv."""
-    found = {}
-    pyenv = Path(os.environ.get("PYENV_ROOT", Path.home() / ".pyenv"))
-    name = f"python3.{minor}"
-    candidates = [shutil.which(name), shutil.which(name, path="/usr/bin")]
-    candidates += map(str, sorted(pyenv.glob(f"versions/3.{minor}.*/bin/{name}")))
-    for interpreter in filter(None, candidates):
-        asked = [interpreter, "-c", "import sys; print(sys.executable)"]
-        answer = subprocess.run(asked, capture_output=True, text=True, check=False)
-        if answer.returncode == 0:
-            found[os.path.realpath(answer.stdout.strip())] = None
-    return list(found)
+def python_libraries() -> dict[str, int]:
+    """Return libpython -> minor version, of those Pythons and of the list in YAWBENCH_TEST_LIBPYTHONS."""
+    files = [f for f in os.environ.get("YAWBENCH_TEST_LIBPYTHONS", "").split(":") if f]
+    files += [library for minor in MINORS for library in pythons(minor).values()]
+    versions = {file: re.search(r"libpython3\.(\d+)\.so", file) for file in files if os.path.exists(file)}
+    return {file: int(found[1]) for file, found in versions.items() if found and int(found[1]) in MINORS}

@@ -5,13 +5,11 @@ from __future__ import annotations
 import subprocess
 import sys
 
-import pytest
 import typer
 from typer.testing import CliRunner
 
 from tests.refusals import each_mentions, mentions
 from yawbench.commands.build import build
-from yawbench.foundation.errors import BuildError
 from yawbench.foundation.workers import Pool
 
 APP = typer.Typer()
@@ -49,30 +47,13 @@ def test_a_name_that_is_no_component_is_wrong_input(tmp_path):
     assert mentions(" ".join(done.stderr.replace("│", " ").split()), "'driver_sin'", "component")
 
 
-def test_a_python_file_from_anywhere_can_be_named(tmp_path):
-    file = tmp_path / "controller_zero.py"
-    file.write_text(
-        "from yawbench.components.fmi.component import Component\n\n\n"
-        'class Zero(Component):\n    """Nothing."""\n\n    outputs = ("yaw_moment",)\n\n'
-        "    def output(self, t, u):\n        return (0.0,)\n"
-    )
-    done = run(file, "--out", tmp_path / "out")
-    assert done.exit_code == 0
-    assert each_mentions(done.stderr, ("controller_zero", "controller_zero.py"))
-    assert (tmp_path / "out" / "controller_zero.fmu").exists()
-
-
 def test_a_component_that_cannot_be_built_ends_with_status_1_and_one_sentence(tmp_path):
     file = tmp_path / "controller_bad.py"
     file.write_text("import numpy\n")
-    error = run(file, "--out", tmp_path / "out").exception
-    assert isinstance(error, BuildError)
-    assert error.exit_status == 1
-    assert str(error).startswith("controller_bad: ")
     command = [sys.executable, "-m", "yawbench", "build", str(file), "--out", str(tmp_path / "out")]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 1
-    assert mentions(done.stderr, "standard", "library")
+    assert mentions(done.stderr, "controller_bad", "standard", "library")
     assert done.stderr.count("\n") == 1
     assert "Traceback" not in done.stderr
 
@@ -85,8 +66,10 @@ def test_without_a_compiler_it_warns(tmp_path, monkeypatch):
     assert mentions(done.stderr, "no-such-compiler", "compiler")
 
 
-@pytest.mark.parametrize("what", ["yawbench.commands.build", "yawbench.cli"])
-def test_the_builder_is_loaded_only_when_it_is_needed(what):
-    script = f"import sys, {what}; print('yawbench.fmus.build' in sys.modules or 'pythonfmu' in sys.modules)"
+def test_the_builder_is_loaded_only_when_it_is_needed():
+    script = (
+        "import sys, yawbench.commands.build\n"
+        "print('yawbench.fmus.build' in sys.modules or 'pythonfmu' in sys.modules)"
+    )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert done.stdout == "False\n"

@@ -14,7 +14,7 @@ from tests.fmus.bare import Fmu, Unit
 from tests.fmus.fake_fmus import make_fmu
 from tests.refusals import each_mentions, mentions, refused, texts_of
 from yawbench.fmus import check
-from yawbench.fmus.build import COMPONENTS, build_all, build_component
+from yawbench.fmus.build import build_component
 from yawbench.fmus.check import defects
 from yawbench.fmus.opener import Opener, host_needs
 from yawbench.foundation.errors import BuildError, ModelDescriptionError
@@ -50,55 +50,105 @@ class Idea(Component):
 '''
 
 
+HEAD = "from dataclasses import"
+FMI = "yawbench.components.fmi"
+INPUTS = '    inputs = ("yaw_rate",)'
+FIRST = "\n\n\nclass Idea"
+"""Texts of it that are replaced."""
+STILLBORN = """    def __init__(self, **kwargs):
+        super().__init__(**kwargs)
+        if "logger" in kwargs:
+            raise OSError("100 % stillborn")
+
+"""
+SPOILT = """    def to_xml(self, model_options=None):
+        root = super().to_xml(model_options)
+        structure = root.find("ModelStructure")
+        structure.remove(structure.find("InitialUnknowns"))
+        return root
+
+"""
+WRONG = {
+    "syntax": (("* u[0],)", "* u[0],"), "controllers/idea.py:28", "SyntaxError", "'('"),
+    "unit": (
+        ('"N.m.s/rad"', '"Nms"'),
+        *("DeclarationError", "Parameters.gain", "'Nms'", "rad.s", "Pa/s", "(controllers/idea.py:19)"),
+    ),
+    "signal": (('("yaw_rate",)', '("yawrate",)'), "'yawrate'", "signal", "dictionary"),
+    "signal of the role": (('"yaw_moment"', '"drive_force"'), "yaw_moment"),
+    "name": (
+        ('"yaw_moment",', '"yaw_moment", signal("Gier winkel", "rad", "text"),'),
+        ("import parameter", "import parameter, signal"),
+        *("'Gier winkel'", "lower-case", "letters"),
+    ),
+    "package": ((HEAD, f"import numpy\n{HEAD}"), "controllers/idea.py:5", "host_packages", '"numpy"'),
+    "not the declared package": (
+        (INPUTS, f'    host_packages = ("scipy",)\n{INPUTS}'),
+        (HEAD, f"import numpy\n{HEAD}"),
+        *("controllers/idea.py:5", "imports numpy"),
+    ),
+    "whole package": (
+        (f"from {FMI}.component import Component", f"import {FMI}.component"),
+        *("controllers/idea.py:7", f"'from {FMI}.component import ...'"),
+    ),
+    "no module": ((f"{FMI}.variables", f"{FMI}.variable"), "controllers/idea.py:8", "fmi.variable"),
+    "module of another room": (
+        (f"{FMI}.variables", "yawbench.components.core.variables"),
+        *("controllers/idea.py:8", "core.variables", f"{FMI}.variables"),
+    ),
+    "beyond the package": ((f"from {FMI}.component", "from ....fmi.component"), "controllers/idea.py:7"),
+    "no component": (("class Idea(Component)", "class Idea"), "define", "component"),
+    "two components": ((FIRST, f"\n\n\nclass First(Component):\n    pass{FIRST}"), "First", "Idea"),
+    "exception": ((FIRST, f"\nL = 1 / 0{FIRST}"), "ZeroDivisionError", "controllers/idea.py:17"),
+    "exit": ((FIRST, f"\nraise SystemExit(0){FIRST}"), "SystemExit", "0", "controllers/idea.py:17"),
+    "no instance": (("    def output", f"{STILLBORN}    def output"), "PyObject_Call"),
+    "description": (
+        ("    def output", f"{SPOILT}    def output"),
+        *("ModelStructure/InitialUnknowns", "yaw_moment"),
+    ),
+}
+"""What is wrong -> replacements in the text, and what the sentence names."""
+
+
+def text_with(*replacements):
+    text = GOOD
+    for old, new in replacements:
+        assert old in text
+        text = text.replace(old, new)
+    return text
+
+
 @pytest.fixture
-def attempt(tmp_path):
+def write(tmp_path):
+    """Write a controller with some text replaced, and return its file."""
+
+    def do(*replacements):
+        file = tmp_path / "own work" / "controllers" / "idea.py"
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(text_with(*replacements), "utf-8")
+        return file
+
+    return do
+
+
+@pytest.fixture
+def attempt(write, tmp_path):
     """Write a controller with some text replaced, try to build it and return the problems."""
 
     def do(*replacements, **options):
-        text = GOOD
-        for old, new in replacements:
-            assert old in text
-            text = text.replace(old, new)
-        file = tmp_path / "own work" / "controllers" / "idea.py"
-        file.parent.mkdir(parents=True, exist_ok=True)
-        file.write_text(text, "utf-8")
         with pytest.raises(BuildError) as caught:
-            build_component(file, tmp_path / "out", **options)
+            build_component(write(*replacements), tmp_path / "out", **options)
         assert list(tmp_path.glob("out/*")) == []
         return [*texts_of(caught.value)]
 
     return do
 
 
-def test_a_syntax_error_names_file_and_line(attempt):
-    (problem,) = attempt(("return (-self.p.gain * u[0],)", "return (-self.p.gain * u[0],"))
-    assert mentions(problem, "controller_idea", "controllers/idea.py:28", "SyntaxError", "'('")
-
-
-def test_an_unknown_unit_lists_the_known_ones(attempt):
-    (problem,) = attempt(('"N.m.s/rad"', '"Nms"'))
-    assert mentions(
-        problem,
-        "controller_idea",
-        "DeclarationError",
-        "Parameters.gain",
-        "'Nms'",
-        "rad.s",
-        "Pa/s",
-        "controllers/idea.py:19",
-        "1",
-    )
-    assert problem.endswith("(controllers/idea.py:19)")
-
-
-def test_an_unknown_signal_is_named(attempt):
-    (problem,) = attempt(('inputs = ("yaw_rate",)', 'inputs = ("yawrate",)'))
-    assert mentions(problem, "'yawrate'", "signal", "dictionary")
-
-
-def test_a_signal_that_the_role_demands_is_named(attempt):
-    problems = attempt(('"yaw_moment"', '"drive_force"'))
-    assert each_mentions(problems, ("controller_idea", "yaw_moment"))
+@pytest.mark.parametrize("what", WRONG)
+def test_what_is_wrong_is_told_in_one_sentence_with_its_place(attempt, what):
+    (problem,) = attempt(*(one for one in WRONG[what] if isinstance(one, tuple)))
+    assert mentions(problem, "controller_idea", *(one for one in WRONG[what] if isinstance(one, str)))
+    assert ("stillborn" in problem) == (what == "no instance")
 
 
 def test_every_missing_signal_of_the_role_is_named(attempt):
@@ -110,31 +160,31 @@ def test_every_missing_signal_of_the_role_is_named(attempt):
     )
 
 
-def test_an_import_from_outside_the_standard_library_is_refused(attempt):
-    (problem,) = attempt(("from dataclasses import", "import numpy\nfrom dataclasses import"))
-    assert mentions(
-        problem, "controller_idea", "controllers/idea.py:5", "host_packages", '"numpy"', "`yawbench`"
-    )
+RIGHT = {
+    "an import that only type checkers see": (
+        (HEAD, f"from typing import TYPE_CHECKING\n\nif TYPE_CHECKING:\n    import numpy\n{HEAD}"),
+    ),
+    "a component that builds on another": (
+        ("class Idea(Component)", "class Base(Component):\n    pass\n\n\nclass Idea(Base)"),
+    ),
+}
 
 
-NEEDY = (
-    ("from dataclasses import dataclass", "import {package}\nfrom dataclasses import dataclass"),
-    ('    inputs = ("yaw_rate",)', '    host_packages = ("{package}",)\n    inputs = ("yaw_rate",)'),
-)
+@pytest.mark.parametrize("what", RIGHT)
+def test_what_is_allowed_is_built(write, tmp_path, what):
+    assert build_component(write(*RIGHT[what]), tmp_path / "out").exists()
 
 
 def needy(package):
-    """Return the controller with an import of a package that it declares."""
-    text = GOOD
-    for old, new in NEEDY:
-        text = text.replace(old, new.format(package=package))
-    return text
+    """Return the replacements for an import of a package that is declared."""
+    return (
+        (HEAD, f"import {package}\n{HEAD}"),
+        (INPUTS, f'    host_packages = ("{package}",)\n{INPUTS}'),
+    )
 
 
-def test_a_package_that_the_component_declares_may_be_imported(tmp_path, unpack):
-    file = tmp_path / "controllers" / "idea.py"
-    file.parent.mkdir()
-    file.write_text(needy("numpy").replace("(-self.p.gain", "(numpy.float64(-1.0) * self.p.gain"))
+def test_a_package_that_the_component_declares_may_be_imported(write, tmp_path, unpack):
+    file = write(*needy("numpy"), ("(-self.p.gain", "(numpy.float64(-1.0) * self.p.gain"))
     fmu = build_component(file, tmp_path / "out")
     unit = Unit(Fmu(unpack(fmu)), yaw_rate=0.5)
     unit.start()
@@ -148,15 +198,13 @@ def test_a_package_that_the_component_declares_may_be_imported(tmp_path, unpack)
     assert mentions((opened.directory / "documentation/index.html").read_text(), "host", "Python", "numpy")
 
 
-def test_a_host_without_a_declared_package_is_told_in_one_sentence(tmp_path, monkeypatch):
+def test_a_host_without_a_declared_package_is_told_in_one_sentence(write, tmp_path, monkeypatch):
     monkeypatch.setenv("YAWBENCH_UNITS", "python")  # a native unit needs no package
     restart_checker()
     module = tmp_path / "modules" / "rare_package.py"
     module.parent.mkdir()
     module.touch()
-    file = tmp_path / "controllers" / "idea.py"
-    file.parent.mkdir()
-    file.write_text(needy("rare_package"))
+    file = write(*needy("rare_package"))
     with monkeypatch.context() as patch:
         patch.syspath_prepend(str(module.parent))
         restart_checker()  # a process with this path
@@ -180,124 +228,6 @@ def restart_checker():
     if check._checker is not None:
         check._checker.close(kill=True)
         check._checker = None
-
-
-def test_a_package_that_is_not_the_declared_one_is_refused(attempt):
-    (problem,) = attempt(
-        ('    inputs = ("yaw_rate",)', '    host_packages = ("scipy",)\n    inputs = ("yaw_rate",)'),
-        ("from dataclasses import", "import numpy\nfrom dataclasses import"),
-    )
-    assert "imports numpy" in problem
-
-
-def test_an_import_that_only_type_checkers_see_is_allowed(tmp_path):
-    text = GOOD.replace(
-        "from dataclasses import",
-        "from typing import TYPE_CHECKING\n\nif TYPE_CHECKING:\n    import numpy\nfrom dataclasses import",
-    )
-    file = tmp_path / "controllers" / "idea.py"
-    file.parent.mkdir()
-    file.write_text(text)
-    assert build_component(file, tmp_path / "out").exists()
-
-
-def test_an_import_of_the_whole_package_says_how_to_write_it(attempt):
-    (problem,) = attempt(
-        (
-            "from yawbench.components.fmi.component import Component",
-            "import yawbench.components.fmi.component",
-        )
-    )
-    assert mentions(
-        problem,
-        "controller_idea",
-        "controllers/idea.py:7",
-        "'from yawbench.components.fmi.component import ...'",
-    )
-
-
-def test_a_module_that_does_not_exist_is_named_with_the_line(attempt):
-    (problem,) = attempt(("yawbench.components.fmi.variables", "yawbench.components.fmi.variable"))
-    assert mentions(problem, "controller_idea", "controllers/idea.py:8", "fmi.variable", "components", "fmi")
-
-
-def test_a_module_that_stands_in_another_room_is_pointed_to(attempt):
-    (problem,) = attempt(("yawbench.components.fmi.variables", "yawbench.components.core.variables"))
-    assert mentions(
-        problem,
-        "controller_idea",
-        "controllers/idea.py:8",
-        "core.variables",
-        "components",
-        "yawbench.components.fmi.variables",
-    )
-
-
-def test_an_import_beyond_the_package_is_refused(attempt):
-    (problem,) = attempt(("from yawbench.components.fmi.component", "from ....fmi.component"))
-    assert mentions(problem, "controller_idea", "controllers/idea.py:7")
-
-
-def test_a_file_without_a_component_is_refused(attempt):
-    (problem,) = attempt(("class Idea(Component)", "class Idea"))
-    assert mentions(problem, "controller_idea", "define", "component")
-
-
-def test_a_file_with_two_components_is_refused(attempt):
-    (problem,) = attempt(("class Idea(", "class First(Component):\n    pass\n\n\nclass Idea("))
-    assert mentions(problem, "controller_idea", "First", "Idea")
-
-
-def test_a_component_may_build_on_another_in_the_same_file(tmp_path):
-    file = tmp_path / "controllers" / "idea.py"
-    file.parent.mkdir()
-    file.write_text(
-        GOOD.replace("class Idea(Component)", "class Base(Component):\n    pass\n\n\nclass Idea(Base)")
-    )
-    assert build_component(file, tmp_path).exists()
-
-
-def test_an_exception_while_importing_names_file_and_line(attempt):
-    (problem,) = attempt(("class Idea", "LIMIT = 1 / 0\n\n\nclass Idea"))
-    assert mentions(problem, "controller_idea", "ZeroDivisionError", "controllers/idea.py:19")
-
-
-def test_leaving_the_interpreter_while_importing_is_an_error(attempt):
-    (problem,) = attempt(("class Idea", "raise SystemExit(0)\n\n\nclass Idea"))
-    assert mentions(problem, "controller_idea", "SystemExit", "0", "controllers/idea.py:19")
-
-
-def test_a_unit_that_cannot_be_instantiated_is_an_error(attempt):
-    (problem,) = attempt(
-        (
-            "    def output",
-            "    def __init__(self, **kwargs):\n        super().__init__(**kwargs)\n"
-            '        if "logger" in kwargs:\n            raise OSError("100 % stillborn")\n\n    def output',
-        )
-    )
-    assert each_mentions(problem, ("controller_idea", "PyObject_Call"), ("'100 % stillborn'",))
-    assert "OSError('100 % stillborn')" in problem
-
-
-def test_a_name_that_is_no_identifier_is_an_error(attempt):
-    (problem,) = attempt(
-        ('"yaw_moment",', '"yaw_moment", signal("Gier winkel", "rad", "text"),'),
-        ("import parameter", "import parameter, signal"),
-    )
-    assert mentions(problem, "'Gier winkel'", "lower-case", "letters")
-
-
-def test_what_fmpy_finds_in_the_model_description_is_an_error(attempt):
-    spoilt = """    def to_xml(self, model_options=None):
-        root = super().to_xml(model_options)
-        structure = root.find("ModelStructure")
-        structure.remove(structure.find("InitialUnknowns"))
-        return root
-
-    def output"""
-    (problem,) = attempt(("    def output", spoilt))
-    assert mentions(problem, "controller_idea", "ModelStructure/InitialUnknowns", "yaw_moment")
-    assert "InitialUnknowns" in problem
 
 
 @pytest.mark.parametrize(
@@ -344,23 +274,6 @@ def test_a_file_from_anywhere_becomes_an_fmu_with_its_neighbours(tmp_path, unpac
     unit.start()
     assert unit.outputs() == [-20.0]
     unit.free()
-
-
-def test_a_component_of_the_project_can_be_built_by_its_file(tmp_path):
-    fmu = build_component(COMPONENTS / "tyres" / "linear.py", tmp_path)
-    assert fmu.name == "tyre_linear.fmu"
-
-
-def test_a_folder_that_cannot_be_written_is_one_sentence(tmp_path, monkeypatch):
-    build_all(tmp_path, components=["tyre_linear"])
-
-    def refuse(*args, **kwargs):
-        raise PermissionError(13, "Permission denied", str(tmp_path))
-
-    monkeypatch.setattr("yawbench.foundation.safe_files.claim", refuse)
-    with pytest.raises(BuildError) as caught:
-        build_all(tmp_path, components=["tyre_linear"], force=True)
-    assert each_mentions(texts_of(caught.value), ("tyre_linear", "[Errno 13]"))
 
 
 LEFT_ALONE = """

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import shutil
 import subprocess
 import zipfile
@@ -10,11 +12,9 @@ from pathlib import Path
 import pytest
 
 from tests.fmus.bare import Fmu, Refused, Unit
-from tests.fmus.programs import in_windows, in_wine, run, ten_steps
+from tests.fmus.programs import begun, in_windows, in_wine, run, ten_steps
 from tests.refusals import each_mentions, mentions, refused
-from yawbench.commands.new import begin
 from yawbench.fmus import recipe
-from yawbench.fmus.build import HERE as FMUS
 from yawbench.fmus.build import build_all, build_component
 from yawbench.fmus.build_stamp import Edition, read_stamp
 from yawbench.fmus.c import c_recipe
@@ -30,15 +30,7 @@ def root(tmp_path, monkeypatch):
     flags = ["-O0" if flag == "-O2" else flag for flag in c_recipe.FLAGS]
     monkeypatch.setattr(c_recipe, "FLAGS", flags)
     monkeypatch.setattr(recipe, "MINGW", "no compiler")
-    return begun(tmp_path)
-
-
-def begun(folder: Path) -> Path:
-    for path, text in begin("controller", "idea", "c", in_checkout=True).files.items():
-        file = folder / path
-        file.parent.mkdir(parents=True, exist_ok=True)
-        file.write_text(text)
-    return folder / "components"
+    return begun(tmp_path).parents[1]
 
 
 @pytest.fixture
@@ -48,15 +40,13 @@ def folder(root):
 
 @pytest.fixture(scope="module")
 def fmu(tmp_path_factory, unpack):
-    """Its FMU as it is begun, and its library loaded."""
+    """Its FMU as it is begun, and its library loaded; the compiler has nothing to warn of."""
     folder = tmp_path_factory.mktemp("begun")
-    return Fmu(unpack(build_component(begun(folder) / "controllers" / "idea", folder / "out")))
-
-
-@pytest.fixture
-def unit(fmu):
-    """An instance of it."""
-    return Unit(fmu, logging_on=True)
+    with contextlib.redirect_stderr(io.StringIO()) as said, pytest.MonkeyPatch.context() as patch:
+        patch.setattr(recipe, "MINGW", "no compiler")
+        made = build_component(begun(folder), folder / "out")
+    assert said.getvalue() == ""
+    return Fmu(unpack(made))
 
 
 def edited(file: Path, old: str, new: str) -> None:
@@ -72,16 +62,12 @@ def problems(folder: Path) -> str:
     return str(error.value)
 
 
-def test_the_same_sources_give_the_same_bytes_wherever_they_stand(folder, tmp_path):
-    first = build_component(folder, tmp_path / "a").read_bytes()
-    elsewhere = tmp_path / "other" / "components" / "controllers" / "idea"
-    shutil.copytree(folder, elsewhere)
-    assert build_component(elsewhere, tmp_path / "other" / "a").read_bytes() == first
-
-
 def test_only_what_has_changed_is_built_again(root, folder, tmp_path):
     assert build_all(tmp_path / "out", root=root).built == ["controller_idea"]
     assert build_all(tmp_path / "out", root=root).current == ["controller_idea"]
+    first = (tmp_path / "out" / "controller_idea.fmu").read_bytes()
+    build_all(tmp_path / "there", root=shutil.copytree(root, tmp_path / "other" / "components"))
+    assert (tmp_path / "there" / "controller_idea.fmu").read_bytes() == first
     edited(folder / "idea.c", "s->x = 0.0", "s->x = 0.5")
     assert build_all(tmp_path / "out", root=root).built == ["controller_idea"]
 
@@ -147,42 +133,21 @@ def test_a_folder_without_a_role_or_a_model_description_is_refused(folder, tmp_p
         build_component(moved, tmp_path / "out")
 
 
-def test_outputs_follow_inputs_and_parameters_until_initialization_ends(unit):
-    unit.set(yaw_rate_ref=0.1, proportional_gain=1000.0)
+def test_parameters_can_be_set_within_their_range_until_initialization_ends_and_outputs_never(fmu):
+    unit = Unit(fmu, yaw_rate_ref=0.1, proportional_gain=1000.0)
     assert unit.outputs() == [100.0]
     unit.set(yaw_rate_ref=0.2)
-    unit.start()
-    assert unit.outputs() == [200.0]
-
-
-def test_a_parameter_out_of_its_range_is_refused_in_one_sentence(unit):
-    unit.set(proportional_gain=-1.0)
-    with pytest.raises(Refused):
-        unit.start()
-    assert each_mentions(unit.messages, ("proportional_gain", "0", "-1"))
-
-
-def test_a_parameter_cannot_be_set_later_and_an_output_never(unit):
     with pytest.raises(Refused):
         unit.set(yaw_moment=1.0)
     unit.start()
+    assert unit.outputs() == [200.0]
     with pytest.raises(Refused):
         unit.set(integral_gain=1.0)
     assert mentions(unit.messages[-1], "integral_gain", "set", "initialization")
-
-
-def test_a_restored_state_goes_on_as_the_first_time(unit):
-    unit.set(yaw_rate_ref=0.05)
-    unit.start()
-    unit.step(0.0, 0.1)
-    saved = unit.save()
-    unit.step(0.1, 0.1)
-    expected = unit.outputs()
-    unit.step(0.2, 0.1)
-    assert unit.outputs() != expected
-    unit.restore(saved)
-    unit.step(0.1, 0.1)
-    assert unit.outputs() == expected
+    unit = Unit(fmu, proportional_gain=-1.0)
+    with pytest.raises(Refused):
+        unit.start()
+    assert each_mentions(unit.messages, ("proportional_gain", "0", "-1"))
 
 
 def test_it_runs_in_a_c_host_without_python(fmu, tmp_path, host):
@@ -196,16 +161,9 @@ def test_it_runs_in_a_c_host_without_python(fmu, tmp_path, host):
         assert run([*strict, *program, "0", "6", "0=0.1"], tmp_path).returncode == 0
 
 
-def test_the_shared_part_compiles_without_warnings(tmp_path, capfd, monkeypatch):
-    monkeypatch.setattr(recipe, "MINGW", "no compiler")
-    build_component(begun(tmp_path) / "controllers" / "idea", tmp_path / "out")
-    assert capfd.readouterr().err == ""
-    assert (FMUS / "c" / "unit.h").is_file()
-
-
 @pytest.mark.skipif(shutil.which(MINGW) is None, reason=f"there is no {MINGW}")
 def test_a_unit_in_c_gets_a_library_for_windows_where_a_compiler_makes_one(tmp_path):
-    folder = begun(tmp_path) / "controllers" / "idea"
+    folder = begun(tmp_path)
     first = build_component(folder, tmp_path / "a")
     with zipfile.ZipFile(first) as fmu:
         names = {name for name in fmu.namelist() if name.startswith("binaries/")}
@@ -231,7 +189,7 @@ def test_a_unit_in_c_gets_a_library_for_windows_where_a_compiler_makes_one(tmp_p
 @in_windows
 def test_the_library_for_windows_steps_as_the_one_for_linux(unpack, tmp_path, wine_prefix):
     edition = Edition(platforms=(TO_WINDOWS.name,))
-    archive = build_component(begun(tmp_path) / "controllers" / "idea", tmp_path / "out", edition=edition)
+    archive = build_component(begun(tmp_path), tmp_path / "out", edition=edition)
     fmu = Fmu(unpack(archive))
     inputs = {"yaw_rate_ref": 0.1, "yaw_rate": 0.02}
     assert in_wine([(fmu, inputs)], tmp_path, wine_prefix) == [ten_steps(fmu, inputs)]

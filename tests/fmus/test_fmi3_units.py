@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 from fmpy.build import build_platform_binary
 from fmpy.fmi3 import FMU3Slave
-from fmpy.validation import validate_fmu
 
 import yawbench as yb
 from tests.refusals import mentions, refused
@@ -38,16 +37,14 @@ def both(tmp_path_factory) -> dict[int, Path]:
     return folders
 
 
-def test_they_are_valid(both):
-    for fmu in both[3].glob("*.fmu"):
-        assert validate_fmu(str(fmu)) == []
-        tool = Path(sys.executable).with_name("fmutool")
-        if tool.exists():
-            done = subprocess.run(
-                [tool, "-input", fmu, "-check"], capture_output=True, text=True, check=False
-            )
-            assert mentions(done.stdout + done.stderr, "compliant", "FMI-3.0")
-            assert mentions(done.stdout + done.stderr, "No semantic error")
+def test_a_unit_with_an_enumeration_is_valid(both):
+    """By another checker than that of the build."""
+    if not (tool := Path(sys.executable).with_name("fmutool")).exists():
+        pytest.skip("fmutool is not installed")
+    fmu = both[3] / "allocator_side_share.fmu"
+    done = subprocess.run([tool, "-input", fmu, "-check"], capture_output=True, text=True, check=False)
+    assert mentions(done.stdout + done.stderr, "compliant", "FMI-3.0")
+    assert mentions(done.stdout + done.stderr, "No semantic error")
 
 
 def test_value_references_are_positions_and_the_time_comes_last(both):
@@ -69,20 +66,16 @@ def test_both_versions_say_the_same_of_their_variables(both):
     assert open_fmu(both[3] / "allocator_side_share.fmu").variables["side_forces"].items
 
 
-def test_the_libraries_are_the_same_files(both):
+def test_fmpy_gets_the_same_numbers_from_both_which_have_the_same_library(both):
     for fmu in both[3].glob("*.fmu"):
         new, old = (zipfile.ZipFile(both[fmi] / fmu.name) for fmi in (3, 2))
         assert new.read(f"binaries/x86_64-linux/{fmu.stem}.so") == old.read("binaries/linux64/native.so")
-
-
-def test_fmpy_gets_the_same_numbers_from_both(both):
-    for fmu in both[3].glob("*.fmu"):
         new, old = (fmpy.simulate_fmu(str(both[fmi] / fmu.name), stop_time=0.2) for fmi in (3, 2))
         assert new.dtype.names == old.dtype.names
         assert new.tobytes() == old.tobytes()
 
 
-def slave(fmu: Path, folder: Path, said: list[str]) -> tuple[FMU3Slave, dict[str, int]]:
+def slave(fmu: Path, folder: Path) -> tuple[FMU3Slave, dict[str, int]]:
     """Return an instance of a unit of FMI 3.0, and its value references."""
     description = fmpy.read_model_description(str(fmu))
     unpacked = fmpy.extract(str(fmu), str(folder))
@@ -94,8 +87,8 @@ def slave(fmu: Path, folder: Path, said: list[str]) -> tuple[FMU3Slave, dict[str
 
 
 def test_a_state_goes_to_another_instance_and_the_time_can_be_read(both, tmp_path):
-    first, refs = slave(both[3] / "controller_pid.fmu", tmp_path / "a", [])
-    second, _ = slave(both[3] / "controller_pid.fmu", tmp_path / "b", [])
+    first, refs = slave(both[3] / "controller_pid.fmu", tmp_path / "a")
+    second, _ = slave(both[3] / "controller_pid.fmu", tmp_path / "b")
     for unit in (first, second):
         unit.enterInitializationMode(startTime=1.0)
         unit.exitInitializationMode()
@@ -112,7 +105,7 @@ def test_a_state_goes_to_another_instance_and_the_time_can_be_read(both, tmp_pat
 
 
 def test_gains_can_be_tuned_between_steps_and_other_parameters_cannot(both, tmp_path):
-    unit, refs = slave(both[3] / "controller_pid.fmu", tmp_path / "a", [])
+    unit, refs = slave(both[3] / "controller_pid.fmu", tmp_path / "a")
     unit.enterInitializationMode(startTime=0.0)
     unit.exitInitializationMode()
     unit.setFloat64([refs["yaw_rate_ref"], refs["velocity_x"]], [0.1, 20.0])
@@ -175,11 +168,8 @@ def test_a_scenario_of_fmi_3_gives_the_same_bytes(yawbench, tmp_path, monkeypatc
     for name in ("two", "three"):
         assert yawbench("run", f"{name}.ssp", "--out", name)[0] == 0
     assert (tmp_path / "two/results.csv").read_bytes() == (tmp_path / "three/results.csv").read_bytes()
-    versions = {
-        name: open_fmu(tmp_path / f"{name}.ssp/resources/plant_seven_dof.fmu").fmi
-        for name in ("two", "three")
-    }
-    assert versions == {"two": 2, "three": 3}
+    for name, version in (("two", 2), ("three", 3)):
+        assert open_fmu(tmp_path / f"{name}.ssp/resources/plant_seven_dof.fmu").fmi == version
 
 
 def test_another_compiler_makes_nothing_stale(both, monkeypatch, tmp_path):

@@ -5,8 +5,6 @@ from __future__ import annotations
 import errno
 import json
 import os
-import subprocess
-import sys
 import time
 import zipfile
 from pathlib import Path
@@ -20,7 +18,7 @@ from yawbench.fmus import archive as fmu_archive
 from yawbench.fmus import zip_members
 from yawbench.fmus.archive import open_fmu
 from yawbench.fmus.description import platform
-from yawbench.foundation.cache import KEEP_DAYS, cache_folder, delete_unused
+from yawbench.foundation.cache import KEEP_DAYS, delete_unused
 from yawbench.foundation.errors import ModelDescriptionError
 
 HERE, SUFFIX = platform()
@@ -73,62 +71,46 @@ def test_an_fmu_is_described_completely(fmu: Path) -> None:
     assert opened.variables["gear"].discrete
 
 
-def test_files_are_unpacked_into_the_cache(fmu: Path, cache: Path) -> None:
-    opened = open_fmu(fmu)
-    assert opened.directory.is_relative_to(cache)
-    assert (opened.directory / "resources/table.txt").read_bytes() == b"1 2 3"
-    assert [entry.name for entry in cache.iterdir()] == [f"{opened.sha256[:32]}-{fmu_archive.FORMAT}"]
-
-
-def test_the_second_opening_reads_no_xml_and_gives_the_same(
-    fmu: Path, monkeypatch: pytest.MonkeyPatch
+def test_equal_fmus_are_unpacked_and_described_once_each_under_its_own_name(
+    fmu: Path, cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     first = open_fmu(fmu)
+    assert first.directory.is_relative_to(cache)
+    assert (first.directory / "resources/table.txt").read_bytes() == b"1 2 3"
+    assert [entry.name for entry in cache.iterdir()] == [f"{first.sha256[:32]}-{fmu_archive.FORMAT}"]
     monkeypatch.setattr(fmu_archive.fmu_description, "describe", None)
     assert open_fmu(fmu) == first
-
-
-def test_equal_content_shares_one_entry_under_its_own_name(fmu: Path, cache: Path, tmp_path: Path) -> None:
     copy = tmp_path / "other.fmu"
     copy.write_bytes(fmu.read_bytes())
-    first, second = open_fmu(fmu), open_fmu(copy)
-    assert second.directory == first.directory
-    assert (second.name, second.path) == ("other", copy)
+    second = open_fmu(copy)
+    assert (second.name, second.path, second.directory) == ("other", copy, first.directory)
     assert len(list(cache.iterdir())) == 1
 
 
-@pytest.mark.parametrize("harm", ["delete", "cut", "edit", "edit in place", "folder", "description"])
+def edited_in_place(file: Path) -> None:
+    """Change nothing but the content."""
+    times = file.stat()
+    file.write_bytes(b"1 9 3")
+    os.utime(file, ns=(times.st_atime_ns, times.st_mtime_ns))
+
+
+HARM = {
+    "delete": Path.unlink,
+    "cut": lambda file: file.write_bytes(b"1"),
+    "edit in place": edited_in_place,
+    "folder": lambda file: (file.unlink(), file.mkdir()),
+    "description": lambda file: (file.parents[2] / "description.json").write_text('{"fmu": {'),
+}
+
+
+@pytest.mark.parametrize("harm", HARM)
 def test_a_damaged_cache_entry_is_put_right(fmu: Path, harm: str) -> None:
     opened = open_fmu(fmu)
     file = opened.directory / "resources/table.txt"
-    if harm == "delete":
-        file.unlink()
-    elif harm == "cut":
-        file.write_bytes(b"1")
-    elif harm == "edit":
-        file.write_bytes(b"9 9 9")
-    elif harm == "edit in place":  # nothing but the content has changed
-        times = file.stat()
-        file.write_bytes(b"1 9 3")
-        os.utime(file, ns=(times.st_atime_ns, times.st_mtime_ns))
-    elif harm == "folder":
-        file.unlink()
-        file.mkdir()
-    else:
-        (opened.directory.parent / "description.json").write_text('{"fmu": {')
+    HARM[harm](file)
     assert open_fmu(fmu) == opened
     assert file.read_bytes() == b"1 2 3"
     assert json.loads((opened.directory.parent / "description.json").read_text())["files"]
-
-
-def test_processes_that_unpack_at_the_same_time_do_not_collide(fmu: Path, cache: Path) -> None:
-    code = "import sys; from yawbench.fmus.archive import open_fmu; print(open_fmu(sys.argv[1]).directory)"
-    command = [sys.executable, "-c", code, str(fmu)]
-    started = [subprocess.Popen(command, stdout=subprocess.PIPE, text=True) for _ in range(2)]
-    said = {process.communicate()[0].strip() for process in started}
-    assert [process.returncode for process in started] == [0] * 2
-    assert said == {str(open_fmu(fmu).directory)}
-    assert len(list(cache.iterdir())) == 1
 
 
 def test_an_entry_made_meanwhile_by_another_process_is_used(
@@ -155,51 +137,9 @@ def test_entries_unused_for_long_are_deleted(fmu: Path, cache: Path, tmp_path: P
     assert sorted(cache.iterdir()) == sorted([new, foreign])
 
 
-@pytest.mark.parametrize("name", ["Größe", "50 %", "a#b", "käse"])
-def test_a_cache_whose_path_is_not_plain_ascii_is_passed_over(
-    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("YAWBENCH_CACHE", str(tmp_path / name))
-    monkeypatch.setattr("tempfile.gettempdir", lambda: str(tmp_path / "temporary"))
-    folder = cache_folder()
-    assert folder.parent == tmp_path / "temporary"
-    assert folder.name.startswith("yawbench-")
-    assert folder.stat().st_mode & 0o777 == 0o700
-
-
-def test_a_temporary_cache_of_another_user_is_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("YAWBENCH_CACHE", str(tmp_path / "ä"))
-    monkeypatch.setattr("tempfile.gettempdir", lambda: str(tmp_path))
-    monkeypatch.setenv("PUBLIC", str(tmp_path))
-    owner = os.getuid()
-    (tmp_path / f"yawbench-{owner + 1}").mkdir()
-    monkeypatch.setattr("os.getuid", lambda: owner + 1)
-    with pytest.raises(ModelDescriptionError) as caught:
-        cache_folder()
-    assert caught.value.code == "cache-unwritable"
-    assert mentions(str(caught.value), "yawbench-1", "YAWBENCH_CACHE", "FMUs")
-
-
-def test_no_plain_folder_at_all_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("YAWBENCH_CACHE", str(tmp_path / "ä"))
-    monkeypatch.setenv("PUBLIC", "/ö")
-    monkeypatch.setattr("tempfile.gettempdir", lambda: "/ü")
-    with pytest.raises(ModelDescriptionError) as caught:
-        cache_folder()
-    assert caught.value.code == "cache-unwritable"
-    assert mentions(str(caught.value), "ä", "YAWBENCH_CACHE", "FMUs")
-
-
-def test_a_missing_fmu_is_said_with_a_guess(fmu: Path, tmp_path: Path) -> None:
-    missing = tmp_path / "tyre_b.fmu"
-    assert mentions(problem(missing), "tyre_b.fmu", "'tyre_a.fmu'")
-    missing = tmp_path / "plant.fmu"
-    assert mentions(problem(missing), "plant.fmu", "tyre_a.fmu")
-
-
-def test_a_file_that_is_no_zip_is_said(fmu: Path) -> None:
+def test_a_missing_fmu_is_said_with_a_guess_and_a_file_that_is_no_zip_as_such(fmu: Path) -> None:
+    assert mentions(problem(fmu.with_name("tyre_b.fmu")), "tyre_b.fmu", "'tyre_a.fmu'")
+    assert mentions(problem(fmu.with_name("plant.fmu")), "plant.fmu", "tyre_a.fmu")
     fmu.write_text("hello")
     assert mentions(problem(fmu), "tyre_a.fmu", "zip", "archive")
 
@@ -256,17 +196,19 @@ def test_a_model_description_that_cannot_be_used_is_said(
     assert "more)" not in said  # of the one violation
 
 
-def test_a_missing_binary_is_said_with_those_there_are(tmp_path: Path, cache: Path) -> None:
-    path = make_fmu(tmp_path / "a.fmu", binaries=["win64x", "darwin65"])
-    assert mentions(problem(path), "a.fmu", "binaries/linux64/a.so", "darwin65", "win64x")
-    path = make_fmu(tmp_path / "a.fmu", binaries=[])
-    assert mentions(problem(path), "a.fmu", "binaries/linux64/a.so")
-
-
-def test_a_binary_of_another_name_is_said_with_the_name_that_is_expected(tmp_path: Path, cache: Path) -> None:
-    path = tmp_path / "a.fmu"
-    make_fmu(path, binaries=[], files={f"binaries/{HERE}/b{SUFFIX}": b"", f"binaries/{HERE}/c.txt": b""})
-    assert mentions(problem(path), "a.fmu", "binaries/linux64/a.so", "b.so", "c.txt")
+@pytest.mark.parametrize(
+    ("binaries", "files", "names"),
+    [
+        (["win64x", "darwin65"], (), ("darwin65", "win64x")),
+        ([], (), ("no binaries",)),
+        ([], (f"binaries/{HERE}/b{SUFFIX}", f"binaries/{HERE}/c.txt"), ("b.so", "c.txt")),
+    ],
+)
+def test_a_missing_binary_is_said_with_those_there_are(
+    binaries: list[str], files: tuple[str, ...], names: tuple[str, ...], tmp_path: Path, cache: Path
+) -> None:
+    path = make_fmu(tmp_path / "a.fmu", binaries=binaries, files=dict.fromkeys(files, b""))
+    assert mentions(problem(path), "a.fmu", "binaries/linux64/a.so", *names)
 
 
 def test_a_full_disk_is_said_and_leaves_nothing_half_done(
@@ -322,22 +264,13 @@ def test_modules_of_a_pythonfmu_unit_are_listed_with_their_content(tmp_path: Pat
 
 
 @pytest.mark.parametrize(
-    "identifier", ["../../../../outside/thief", "/tmp/thief", "a\\b", "a/b", "..", "C:thief", "x" * 300, ""]
+    "identifier", ["../../../../outside/thief", "/tmp/thief", "a\\b", "..", "C:thief", "x" * 300, ""]
 )
 def test_an_identifier_that_leads_out_of_the_archive_is_refused(
     identifier: str, tmp_path: Path, cache: Path
 ) -> None:
-    path = make_fmu(tmp_path / "a.fmu", outputs=[out("force", unit="N")])
-    with zipfile.ZipFile(path) as archive:
-        content = {name: archive.read(name) for name in archive.namelist()}
-    xml = content["modelDescription.xml"].decode()
-    assert 'modelIdentifier="a"' in xml
-    content["modelDescription.xml"] = xml.replace(
-        'modelIdentifier="a"', f'modelIdentifier="{identifier}"'
-    ).encode()
-    with zipfile.ZipFile(path, "w") as archive:
-        for name, data in content.items():
-            archive.writestr(name, data)
+    xml = ONE_OUTPUT.replace('modelIdentifier="a"', f'modelIdentifier="{identifier}"')
+    path = make_fmu(tmp_path / "a.fmu", xml=xml)
     assert "modelIdentifier" in problem(path)
 
 

@@ -6,11 +6,9 @@ import sys
 
 import pytest
 
-from tests.fmus.bare import Fmu, Unit
 from tests.fmus.test_build_errors import GOOD
 from tests.refusals import refused
 from yawbench.fmus.build import build_component, recipe_of
-from yawbench.fmus.source_digests import SourceDigests
 from yawbench.fmus.staging import staged
 from yawbench.foundation.errors import BuildError
 
@@ -90,14 +88,6 @@ def test_a_package_needs_no_init_file(mylab, imports):
         assert sys.modules["packed.controllers.idea"].FACTOR == 4.0
 
 
-def test_the_fmu_runs_where_the_package_is_unknown(mylab, tmp_path, unpack):
-    fmu = build_component(mylab(IMPORTS["relative"]), tmp_path / "out")
-    unit = Unit(Fmu(unpack(fmu)), yaw_rate=0.5)
-    unit.start()
-    assert unit.outputs() == [-4.0 * 100.0 * 0.5]
-    unit.free()
-
-
 def test_modules_beside_the_file_are_found_by_either_kind_of_name(tmp_path):
     (tmp_path / "gains.py").write_text("from helpers import one\n\nFACTOR = 4.0 * one()\n")
     (tmp_path / "helpers.py").write_text("def one():\n    return 1.0\n")
@@ -114,16 +104,6 @@ def test_modules_beside_the_file_are_found_by_either_kind_of_name(tmp_path):
         with staged(files, "packed") as stage:
             stage.component(recipe.module)
             assert sys.modules["packed.controllers.controller_idea"].FACTOR == 4.0
-
-
-def test_a_change_of_the_own_package_makes_the_fmu_stale(mylab):
-    file = mylab(IMPORTS["relative"])
-    recipe = recipe_of(file)
-    key, evidence = recipe.key(), recipe.evidence()
-    assert SourceDigests().confirm(evidence)
-    (file.parents[1] / "units.py").write_text("ONE = 2.0\n")
-    assert not SourceDigests().confirm(evidence)
-    assert recipe_of(file).key() != key
 
 
 @pytest.mark.parametrize("imports", FORBIDDEN)

@@ -11,10 +11,11 @@ from pathlib import Path
 import pytest
 
 from tests.commands.test_batch_commands import SCENARIO
+from tests.fmus.test_rebuild_stale import without_native_libraries
 from tests.refusals import each_mentions, mentions
 from yawbench.fmus import opener
 from yawbench.fmus.opener import HOME
-from yawbench.orchestrator.results.reader import Results, load_results
+from yawbench.orchestrator.results.reader import load_results
 
 UNITS = ("driver_sine", "reference_steady_state", "controller_off", "controller_fuzzy_sideslip")
 LAW = '''
@@ -37,23 +38,10 @@ class Follow(Component):
 Install = Callable[..., Path]
 
 
-@pytest.fixture(scope="module")
-def shared(tmp_path_factory) -> Path:
-    """A cache for all tests: what is compiled of the sample is the same in most."""
-    return tmp_path_factory.mktemp("cache")
-
-
-@pytest.fixture
-def cache(shared, monkeypatch) -> Path:
-    """A cache without FMUs, in place of the user's."""
-    shutil.rmtree(shared / "fmus", ignore_errors=True)
-    monkeypatch.setenv("YAWBENCH_CACHE", str(shared))
-    return shared
-
-
 @pytest.fixture
 def install(tmp_path, monkeypatch, cache) -> Iterator[Install]:
     """Install a sample package, as an installer would leave it on Python's path."""
+    without_native_libraries(monkeypatch)
     site = tmp_path / "site"
     site.mkdir()
     monkeypatch.syspath_prepend(site)
@@ -88,98 +76,89 @@ def yawbench(yawbench, fmus, tmp_path, monkeypatch):
     return yawbench
 
 
-def gain_in(run: Results) -> float:
-    """Return the ratio of the peaks of output and input."""
+@pytest.fixture
+def run(yawbench) -> Callable[..., tuple[int, str]]:
+    """Run the scenario, or another command, with a controller; return the status and what is said."""
+
+    def do(controller: str, *more: str, command: str = "run") -> tuple[int, str]:
+        status, _, said = yawbench(command, "half.yaml", "--swap", f"controller={controller}", *more)
+        return status, said
+
+    return do
+
+
+def refused(answer: tuple[int, str], *names: str) -> bool:
+    """Assert that a run was wrong input, told in one line that names the swap and these things."""
+    status, said = answer
+    assert status == 2
+    return each_mentions(said, ("--swap controller=", *names))
+
+
+def gain_in(folder: str) -> float:
+    """Return the ratio of the peaks of output and input of a run."""
+    run = load_results(Path(folder))
     return float(abs(run.find("yaw_moment")).max() / abs(run.find("yaw_rate_ref")).max())
 
 
-def test_a_component_of_a_package_is_found_built_and_run(install, yawbench, cache):
-    install()
-    status, _, said = yawbench(
-        "run", "half.yaml", "--swap", "controller=controller_follow", "--out", "results/one"
-    )
+def test_a_component_of_a_package_is_found_built_and_built_again_when_a_file_beside_it_has_changed(
+    install, run, cache
+):
+    controllers = install()
+    status, said = run("controller_follow", "--out", "results/one")
     assert status == 0, said
     assert mentions(said.splitlines()[0], "controller_follow", "my")
-    run = load_results(Path("results/one"))
-    assert gain_in(run) == pytest.approx(3.0, rel=0.01)
+    assert gain_in("results/one") == pytest.approx(3.0, rel=0.01)
     assert (cache / "fmus").is_dir()
     assert sorted(path.name for path in Path("fmus").iterdir()) == sorted(f"{name}.fmu" for name in UNITS)
-
-
-def test_it_is_built_again_when_a_file_beside_it_has_changed(install, yawbench):
-    controllers = install()
-    swap = ("--swap", "controller=controller_follow")
-    assert yawbench("run", "half.yaml", *swap)[0] == 0
-    _, _, said = yawbench("run", "half.yaml", *swap)
-    assert "built" not in said
+    assert "built" not in run("controller_follow")[1]
     (controllers / "_gains.py").write_text("GAIN = 5.0\n")
-    _, _, said = yawbench("run", "half.yaml", *swap, "--out", "results/two")
-    assert "controller_follow: built" in said
-    run = load_results(Path("results/two"))
-    assert gain_in(run) == pytest.approx(5.0, rel=0.01)
+    assert "controller_follow: built" in run("controller_follow", "--out", "results/two")[1]
+    assert gain_in("results/two") == pytest.approx(5.0, rel=0.01)
 
 
-def test_without_building_it_is_said_how_to_build_it(install, yawbench):
+def test_one_that_is_not_built_is_suggested_and_listed_and_told_how_to_build(install, run, yawbench):
     install()
-    command = ("run", "half.yaml", "--swap", "controller=controller_follow", "--no-build")
-    status, _, said = yawbench(*command)
-    assert status == 2
-    assert each_mentions(
-        said, ("--swap controller=controller_follow", "'yawbench build controller_follow'", "my")
+    assert mentions(run("controller_folow")[1], "'controller_follow'")
+    assert refused(
+        run("controller_follow", "--no-build"),
+        "controller_follow",
+        "'yawbench build controller_follow'",
+        "my",
     )
-    status, _, said = yawbench("build", "controller_follow")
-    assert status == 0
-    assert mentions(said, "controller_follow", "my")
-    assert yawbench(*command)[0] == 0
-
-
-def test_it_is_suggested_and_listed(install, yawbench):
-    install()
-    _, _, said = yawbench("run", "half.yaml", "--swap", "controller=controller_folow")
-    assert mentions(said, "'controller_follow'")
     status, out, said = yawbench("list", "fmus")
     assert status == 0
     assert mentions(out + said, "controller_follow", "yawbench build")  # which a list never does
     assert "controller_off" in out
-    assert yawbench("build", "controller_follow")[0] == 0
+    status, _, said = yawbench("build", "controller_follow")
+    assert status == 0
+    assert mentions(said, "controller_follow", "my")
     _, out, said = yawbench("list", "fmus")
     assert "controller_follow" in out
     assert "not built" not in out + said
+    assert run("controller_follow", "--no-build")[0] == 0
 
 
-def test_a_name_that_is_also_in_the_folder_is_told_and_the_folder_counts(install, yawbench):
+def test_a_name_that_is_also_in_the_folder_is_told_and_the_folder_counts(install, run):
     install(name="off")
-    status, _, said = yawbench("check", "half.yaml", "--swap", "controller=controller_off")
+    status, said = run("controller_off", command="check")
     assert status == 0
-    assert mentions(
-        next(line for line in said.splitlines() if "the package my-laws" in line),
-        "note",
-        "controller_off",
-        "fmus",
-        "my",
-    )
-    assert yawbench("run", "half.yaml", "--swap", "controller=controller_off", "--out", "results/off")[0] == 0
-    assert not load_results(Path("results/off")).find("yaw_moment").any()
+    assert mentions(said, "note", "controller_off", "fmus", "the package my-laws")
+    assert run("controller_off", "--out", "results/off")[0] == 0
+    assert gain_in("results/off") == 0.0
 
 
-def test_a_name_in_two_packages_is_refused(install, yawbench):
+def test_a_name_in_two_packages_is_refused(install, run):
     install()
     install("your-laws", gain=4.0)
-    status, _, said = yawbench("run", "half.yaml", "--swap", "controller=controller_follow")
-    assert status == 2
-    assert each_mentions(said, ("--swap controller=controller_follow", "my", "your"))
+    assert refused(run("controller_follow"), "controller_follow", "my", "your")
 
 
-def test_an_entry_point_that_names_nothing_is_told_with_its_package(install, yawbench):
+def test_an_entry_point_that_names_nothing_is_told_with_its_package(install, run):
     install(of="my_laws.parts")
-    status, _, said = yawbench("run", "half.yaml", "--swap", "controller=controller_follow")
-    assert status == 2
-    assert each_mentions(
-        said, ("--swap controller=controller_follow", "'laws'", "yawbench.components", "'my_laws.parts'")
-    )
+    assert refused(run("controller_follow"), "'laws'", "yawbench.components", "'my_laws.parts'")
 
 
-def test_folders_of_the_environment_come_after_the_nearest(yawbench, tmp_path, monkeypatch):
+def test_folders_of_the_environment_come_after_the_nearest(run, yawbench, tmp_path, monkeypatch):
     first, second = tmp_path / "first", tmp_path / "second"
     first.mkdir()
     second.mkdir()
@@ -187,63 +166,38 @@ def test_folders_of_the_environment_come_after_the_nearest(yawbench, tmp_path, m
     shutil.copy("fmus/controller_fuzzy_sideslip.fmu", second / "controller_mine.fmu")
     shutil.copy("fmus/controller_off.fmu", second / "controller_off.fmu")
     monkeypatch.setenv(opener.FOLDERS, f"{first}:{second}")
-    status, _, said = yawbench(
-        "run", "half.yaml", "--swap", "controller=controller_mine", "--out", "results/mine"
-    )
+    status, said = run("controller_mine", "--out", "results/mine")
     assert status == 0
-    assert mentions(
-        next(line for line in said.splitlines() if "/first" in line),
-        "note",
-        "controller_mine",
-        "first",
-        "second",
-    )
-    assert not load_results(Path("results/mine")).find("yaw_moment").any()
-    _, _, said = yawbench("check", "half.yaml", "--swap", "controller=controller_off")
-    assert mentions(
-        next(line for line in said.splitlines() if "/second" in line),
-        "note",
-        "controller_off",
-        "fmus",
-        "second",
-    )
-    status, out, _ = yawbench("list", "fmus")
-    assert "controller_mine" in out
+    assert mentions(said, "note", "controller_mine", "/first", "second")
+    assert gain_in("results/mine") == 0.0
+    _, said = run("controller_off", command="check")
+    assert mentions(said, "note", "controller_off", "fmus", "/second")
+    assert "controller_mine" in yawbench("list", "fmus")[1]
 
 
-def test_a_folder_of_the_environment_that_is_not_there_is_told(yawbench, tmp_path, monkeypatch):
+def test_a_folder_of_the_environment_that_is_not_there_is_told(run, tmp_path, monkeypatch):
     monkeypatch.setenv(opener.FOLDERS, str(tmp_path / "nothing"))
-    status, _, said = yawbench("run", "half.yaml", "--swap", "controller=controller_mine")
-    assert status == 2
-    assert each_mentions(said, ("--swap controller=controller_mine", "YAWBENCH_FMUS", "nothing"))
+    assert refused(run("controller_mine"), "YAWBENCH_FMUS", "nothing")
 
 
 def test_nothing_is_searched_where_every_name_is_in_the_folder(yawbench, monkeypatch):
-    def searched():
-        raise AssertionError
-
-    monkeypatch.setattr(opener, "packaged_components", searched)
+    monkeypatch.setattr(opener, "packaged_components", None)
     assert yawbench("run", "half.yaml")[0] == 0
 
 
-def test_a_folder_with_a_suppliers_fmu_alone_is_enough(yawbench, tmp_path, fmus):
+def test_a_folder_with_a_suppliers_fmu_alone_is_enough(run, tmp_path, fmus):
     folder = tmp_path / "work" / "fmus"
-    shutil.copy(fmus / "controller_off.fmu", tmp_path / "controller_bought.fmu")
     shutil.rmtree(folder)
     folder.mkdir()
-    shutil.move(tmp_path / "controller_bought.fmu", folder)
-    assert yawbench("run", "half.yaml", "--swap", "controller=controller_bought", "--out", "out")[0] == 0
+    shutil.copy(fmus / "controller_off.fmu", folder / "controller_bought.fmu")
+    assert run("controller_bought", "--out", "out")[0] == 0
     used = {fmu.name: fmu.sha256 for fmu in load_results(Path("out")).record.fmus.values()}
-    own = {name: sha256(HOME / f"{name}.fmu") for name in used if name != "controller_bought"}
-    assert used == {**own, "controller_bought": sha256(folder / "controller_bought.fmu")}
-    status, _, told = yawbench("run", "half.yaml", "--swap", "controller=controller_offf")
+    places = {name: (folder if name == "controller_bought" else HOME) / f"{name}.fmu" for name in used}
+    assert used == {name: hashlib.sha256(file.read_bytes()).hexdigest() for name, file in places.items()}
+    status, told = run("controller_offf")
     assert status == 2
     assert mentions(told, "'controller_offf'", "'controller_off'?")
     assert "controller_bought" not in told
-    status, _, told = yawbench("run", "half.yaml", "--swap", "controller=xyz")
+    status, told = run("xyz")
     assert status == 2
     assert 0 < sum(fmu.stem in told for fmu in HOME.glob("*.fmu")) < 15
-
-
-def sha256(file: Path) -> str:
-    return hashlib.sha256(file.read_bytes()).hexdigest()

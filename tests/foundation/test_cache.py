@@ -14,6 +14,7 @@ from tests.fmus.fake_fmus import make_fmu
 from tests.refusals import each_mentions, mentions, refused
 from yawbench.fmus.archive import open_fmu
 from yawbench.foundation.cache import STORES, cache_folder, keep, recall
+from yawbench.foundation.errors import ModelDescriptionError
 from yawbench.foundation.safe_files import write_whole
 
 
@@ -41,16 +42,6 @@ def test_what_is_kept_comes_back_until_something_else_is_kept(cache):
     assert recall("keys", "key") == b"two"
     assert len(list(cache.glob("keys/*"))) == 1
     assert recall("keys", "other") is None
-
-
-def test_what_is_kept_is_found_without_a_look_at_all_that_is_kept(cache, monkeypatch):
-    def refuse(*_):
-        raise AssertionError("the folder is listed")
-
-    keep("keys", "key", b"one")
-    monkeypatch.setattr(os, "listdir", refuse)
-    monkeypatch.setattr(os, "scandir", refuse)
-    assert recall("keys", "key") == b"one"
 
 
 @pytest.mark.parametrize("harm", [b"", b"tw", b"twx"])
@@ -96,21 +87,40 @@ def test_clear_deletes_what_is_ours(full, capsys):
     assert [path for store in STORES for path in (full / store).iterdir()] == []
 
 
-def test_a_home_that_is_none_gives_a_temporary_cache(tmp_path, monkeypatch):
-    monkeypatch.delenv("YAWBENCH_CACHE", raising=False)
-    monkeypatch.setattr("tempfile.gettempdir", lambda: str(tmp_path))
-
-    def no_home(name):
-        raise RuntimeError("could not determine the home directory")
-
-    for without in (lambda name: Path("~/.cache") / name, no_home):
-        monkeypatch.setattr("platformdirs.user_cache_path", without)
-        assert cache_folder() == tmp_path / f"yawbench-{os.getuid()}"
+@pytest.mark.parametrize("name", ["Größe", "50 %"])
+def test_a_cache_whose_path_is_not_plain_ascii_is_passed_over(name, tmp_path, monkeypatch):
+    monkeypatch.setenv("YAWBENCH_CACHE", str(tmp_path / name))
+    monkeypatch.setattr("tempfile.gettempdir", lambda: str(tmp_path / "temporary"))
+    folder = cache_folder()
+    assert folder == tmp_path / "temporary" / f"yawbench-{os.getuid()}"
+    assert folder.stat().st_mode & 0o777 == 0o700
 
 
-def test_a_cache_that_cannot_be_made_is_passed_over(tmp_path, monkeypatch):
+@pytest.mark.parametrize("owner", ["another", "nobody"])
+def test_where_no_folder_can_be_trusted_or_is_plain_it_is_said(owner, tmp_path, monkeypatch):
+    monkeypatch.setenv("YAWBENCH_CACHE", str(tmp_path / "ä"))
+    places = (str(tmp_path), str(tmp_path)) if owner == "another" else ("/ü", "/ö")
+    monkeypatch.setattr("tempfile.gettempdir", lambda: places[0])
+    monkeypatch.setenv("PUBLIC", places[1])
+    user = os.getuid() + 1
+    (tmp_path / f"yawbench-{user}").mkdir()
+    monkeypatch.setattr("os.getuid", lambda: user)
+    names = ("FMUs", "YAWBENCH_CACHE", f"yawbench-{user}" if owner == "another" else "ä")
+    with refused(ModelDescriptionError, "cache-unwritable", names=names):
+        cache_folder()
+
+
+def no_home(name):
+    raise RuntimeError("could not determine the home directory")
+
+
+@pytest.mark.parametrize("users", [lambda name: Path("~/.cache") / name, no_home, None])
+def test_where_there_is_no_home_or_no_cache_can_be_made_there_a_temporary_one_serves(
+    users, tmp_path, monkeypatch
+):
     (tmp_path / "file").touch()
-    monkeypatch.setenv("YAWBENCH_CACHE", str(tmp_path / "file" / "cache"))
+    monkeypatch.setenv("YAWBENCH_CACHE", "" if users else str(tmp_path / "file" / "cache"))
+    monkeypatch.setattr("platformdirs.user_cache_path", users)
     monkeypatch.setattr("tempfile.gettempdir", lambda: str(tmp_path))
     assert cache_folder() == tmp_path / f"yawbench-{os.getuid()}"
     keep("keys", "key", b"two")

@@ -69,14 +69,6 @@ def call():
     return call_one
 
 
-def test_a_forked_process_leaves_the_working_folder_alone(trap, call, monkeypatch):
-    monkeypatch.chdir(trap)
-    monkeypatch.setattr(sys, "path", [folder for folder in sys.path if folder])
-    processes.server.close()
-    assert call(os.getcwd) == str(trap)
-    assert not (trap / "taken").exists()
-
-
 def test_a_forked_process_has_the_environment_and_output_of_its_caller_as_they_are_now(
     call, monkeypatch, capfd
 ):

@@ -24,19 +24,13 @@ TOGETHER = (
     "free:_exit", "free:thread", "free:log_after", "value:nan", "value:huge_text",
 )  # fmt: skip
 OF_EACH_KIND = (
-    "step:_exit",
-    "step:garbage",
-    "step:close",
-    "step:rounding",
-    "step:escape",
-    "free:thread",
-    "value:nan",
-)
+    "step:_exit", "step:garbage", "step:close", "step:rounding", "step:escape", "free:thread", "value:nan",
+)  # fmt: skip
 """A few of them, for the first tier; one that does not come back is in test_run.py."""
 APART = (
     "load:exit", "enter:segfault", "step:_exit", "step:hang", "step:child_crash", "step:garbage",
-    "step:close", "get:stop", "set:flood",
-    "terminate:kill", "free:hang", "value:nan", "value:huge_text", "step:status_minus", "leave:long",
+    "step:close", "get:stop", "set:flood", "terminate:kill", "free:hang", "value:nan", "value:huge_text",
+    "step:status_minus", "leave:long",
 )  # fmt: skip
 
 

@@ -11,11 +11,10 @@ import zipfile
 import pytest
 
 from tests.checkout import ROOT
+from tests.fmus.programs import begun
 from tests.refusals import mentions
-from yawbench.commands.new import begin
 from yawbench.fmus.archive import REASON, runs_as
 from yawbench.fmus.build import build_component
-from yawbench.fmus.compiler import compiler_command
 from yawbench.fmus.fmu import RunsAs
 
 LAW = '''"""A law."""
@@ -57,12 +56,12 @@ with tempfile.TemporaryDirectory() as folder:
 """
 
 
-@pytest.fixture(scope="module")
-def law(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("controllers")
-    file = folder / "controller_law.py"
-    file.write_text(LAW.replace("BODY", "self.p.gain * (u[0] - u[1])"))
-    return build_component(file, folder)
+def built(folder, body, law=LAW):
+    """Return the FMU of the law, and its file."""
+    file = folder / "controllers" / "controller_law.py"
+    file.parent.mkdir()
+    file.write_text(law.replace("BODY", body))
+    return build_component(file, folder), file
 
 
 def asked(archive, **environment):
@@ -77,14 +76,9 @@ def asked(archive, **environment):
     return json.loads(done.stdout.splitlines()[-1])
 
 
-def test_the_archive_holds_the_native_library_beside_python(law):
-    names = zipfile.ZipFile(law).namelist()
-    assert {"binaries/linux64/native.so", "binaries/linux64/libpythonfmu-export.so"} <= set(names)
-    assert any(name.startswith("resources/yawbench_") for name in names)
+def test_the_launcher_opens_the_native_library_and_python_on_request(tmp_path, monkeypatch):
+    law, _ = built(tmp_path, "self.p.gain * (u[0] - u[1])")
     assert runs_as(law).native
-
-
-def test_the_launcher_opens_the_native_library_and_python_on_request(law, monkeypatch):
     native, python = asked(law), asked(law, YAWBENCH_UNITS="python")
     assert native[1:] == [True, False] and python[1:] == [False, True]
     assert native[0] == python[0] == 2000.0 * (0.3 - 0.1)
@@ -93,11 +87,7 @@ def test_the_launcher_opens_the_native_library_and_python_on_request(law, monkey
 
 
 def test_what_is_not_translated_runs_in_python_and_says_why(tmp_path):
-    folder = tmp_path / "controllers"
-    folder.mkdir()
-    file = folder / "controller_law.py"
-    file.write_text(LAW.replace("BODY", "sum(x for x in u if x > 0.0)"))
-    made = build_component(file, folder)
+    made, file = built(tmp_path, "sum(x for x in u if x > 0.0)")
     line = file.read_text().splitlines().index("        return (sum(x for x in u if x > 0.0),)") + 1
     why = f"a filter that is only known at run time (controllers/controller_law.py:{line})"
     assert zipfile.ZipFile(made).read(REASON).decode() == why
@@ -106,15 +96,11 @@ def test_what_is_not_translated_runs_in_python_and_says_why(tmp_path):
 
 
 def test_a_component_that_reads_a_file_when_it_is_imported_runs_in_python(tmp_path):
-    folder = tmp_path / "controllers"
-    folder.mkdir()
     data = tmp_path / "gain.txt"
     data.write_text("2.0")
-    file = folder / "controller_law.py"
-    law = LAW.replace("BODY", "GAIN * (u[0] - u[1])")
-    file.write_text(law.replace("\n\n\n", f"\n\nGAIN = float(open({str(data)!r}).read())\n\n\n", 1))
+    read = f"\n\nGAIN = float(open({str(data)!r}).read())\n\n\n"
+    made, file = built(tmp_path, "GAIN * (u[0] - u[1])", LAW.replace("\n\n\n", read, 1))
     line = next(k for k, text in enumerate(file.read_text().splitlines(), 1) if text.startswith("GAIN"))
-    made = build_component(file, folder)
     where = f"(controllers/controller_law.py:{line})"
     assert runs_as(made) == RunsAs(f"{data} is read at every import, and may change after the build {where}")
     before = asked(made)
@@ -125,28 +111,5 @@ def test_a_component_that_reads_a_file_when_it_is_imported_runs_in_python(tmp_pa
 @pytest.mark.parametrize("kind", ["controller", "driver", "plant", "reference", "road", "tyre"])
 @pytest.mark.sampled(2)
 def test_what_yawbench_new_writes_is_native(kind, tmp_path):
-    for path, text in begin(kind, "idea", in_checkout=False).files.items():
-        file = tmp_path / path
-        file.parent.mkdir(parents=True, exist_ok=True)
-        file.write_text(text)
+    begun(tmp_path, kind, "python")
     assert runs_as(build_component(tmp_path / f"{kind}s" / "idea.py", tmp_path / "out")).native
-
-
-def test_the_native_library_needs_libm_and_libc_alone(law, tmp_path):
-    library = tmp_path / "native.so"
-    library.write_bytes(zipfile.ZipFile(law).read("binaries/linux64/native.so"))
-    said = subprocess.run(["ldd", str(library)], capture_output=True, text=True, check=True).stdout
-    needed = {line.split()[0].partition(".so")[0] for line in said.splitlines()}
-    assert needed <= {"linux-vdso", "libm", "libc", "/lib64/ld-linux-x86-64"}
-
-
-def test_without_compiler_a_unit_runs_in_python(tmp_path, monkeypatch):
-    monkeypatch.setenv("CC", "no-such-compiler")
-    monkeypatch.setenv("YAWBENCH_CACHE", str(tmp_path / "cache"))
-    folder = tmp_path / "controllers"
-    folder.mkdir()
-    file = folder / "controller_law.py"
-    file.write_text(LAW.replace("BODY", "self.p.gain * (u[0] - u[1])"))
-    made = build_component(file, folder)
-    assert compiler_command() == ["no-such-compiler"]
-    assert mentions(str(runs_as(made)), "no-such-compiler", "CC")

@@ -97,27 +97,10 @@ REFUSED = {
         "x is read before the inner function sets it",
         4,
     ),
-    "an item of a table that may be True": (
-        "def output(self, t, u):\n    x = (0.5, 1, True)[int(u[0]) % 3]\n    return (isinstance(x, bool),)",
-        "a number that is True or False on some paths, another integer on others",
-        3,
-    ),
     "functions made by a generator expression": (
         "def output(self, t, u):\n    return (next(iter((lambda: x) for x in u))(),)",
         "functions or generators made by a generator expression",
         2,
-    ),
-    "an integer of 64 bits in the state": (
-        "def start(self, t, u):\n    self.n = 2**60\ndef advance(self, t, h, u):\n    self.n = -1\n"
-        "def output(self, t, u):\n    return (u[0] if self.n else 0.0,)",
-        "an integer of 64 bits or another number",
-        3,
-    ),
-    "an array that is kept": (
-        "def start(self, t, u):\n    self.a = array('d', u)\n"
-        "def output(self, t, u):\n    return (self.a[0],)",
-        "an array that is passed on between steps",
-        1,
     ),
     "an array that is passed on between passes": (
         "def output(self, t, u):\n    a = array('d', u)\n    for k in range(self.p.count):\n"
