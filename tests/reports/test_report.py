@@ -32,7 +32,7 @@ from yawbench.foundation.errors import ScenarioError
 from yawbench.metrics.verdict import Status, worded
 from yawbench.reports.overview_page import held
 from yawbench.reports.page_parts import with_minus
-from yawbench.reports.planes import PLANES
+from yawbench.reports.phase_planes import PLANES
 from yawbench.studies.load_experiment import found_studies, load_experiment
 from yawbench.studies.result_tables import share
 

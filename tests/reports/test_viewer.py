@@ -26,7 +26,7 @@ from yawbench.orchestrator.results.reader import Results
 from yawbench.orchestrator.results.run_record import ConnectionRecord, RunRecord
 from yawbench.reports.page_parts import without_comments
 from yawbench.reports.viewer import MOST, Settings, answer_of, check_panels, page, still_of, viewer
-from yawbench.reports.viewer_data import pack
+from yawbench.reports.viewer_samples import pack
 from yawbench.reports.viewer_views import PANELS, View, views_of
 from yawbench.vocabulary.lane_change import lanes_of
 from yawbench.vocabulary.wheels import WHEELS

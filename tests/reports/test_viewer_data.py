@@ -12,7 +12,7 @@ import pytest
 from tests.orchestrator.recorded import results
 from tests.reports.made_up import whole_car
 from yawbench.orchestrator.results.reader import Results
-from yawbench.reports.viewer_data import CLOSE, COARSE, EXACT, FINE, PackedRun, pack
+from yawbench.reports.viewer_samples import CLOSE, COARSE, EXACT, FINE, PackedRun, pack
 
 RNG = np.random.default_rng(11)
 

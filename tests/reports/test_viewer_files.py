@@ -13,7 +13,7 @@ import pytest
 from tests.reports.made_up import whole_car
 from tests.reports.test_viewer import VIEWER, opened, written
 from yawbench.figures.panels import LabelledRun
-from yawbench.reports.viewer_data import COARSE
+from yawbench.reports.viewer_samples import COARSE
 from yawbench.reports.viewer_views import Bound, Mark, View
 
 A, B, C = "no control", "fuzzy, new", "third/law"

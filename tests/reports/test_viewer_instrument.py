@@ -23,7 +23,7 @@ from yawbench.figures import plots
 from yawbench.figures.panels import LabelledRun
 from yawbench.figures.plots import draw
 from yawbench.orchestrator.results.reader import Results
-from yawbench.reports.planes import PLANES
+from yawbench.reports.phase_planes import PLANES
 from yawbench.reports.viewer import LEAST
 from yawbench.reports.viewer_views import Mark, View
 from yawbench.vocabulary.gravity import G

@@ -39,7 +39,7 @@ from yawbench.orchestrator.wiring.parameters import value_for
 from yawbench.planner import Planner
 from yawbench.reports.page_parts import Page, render
 from yawbench.reports.viewer import Settings, assets, viewer
-from yawbench.reports.viewer_data import PackedRun, pack
+from yawbench.reports.viewer_samples import PackedRun, pack
 from yawbench.studies.jobs import LASTING, NEEDED, Job, execute, keyed, planned, recorded
 from yawbench.vocabulary.facts import FACTS
 from yawbench.vocabulary.units import DISPLAYED

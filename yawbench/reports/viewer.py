@@ -1,7 +1,7 @@
 """Interactive viewer of runs: signals over time, differences, the road from above; part of a page, or a page.
 
 `viewer` is a part of a page, `assets` are the page's style sheets and scripts. A page needs no server and no
-network. It carries every recorded sample (`viewer_data`); axes and zooming are those of uPlot, taken from the
+network. It carries every recorded sample (`viewer_samples`); axes and zooming are those of uPlot, taken from the
 installed package `uplot-python`.
 """
 
@@ -43,9 +43,9 @@ from yawbench.orchestrator.results.run_record import RunStatus
 from yawbench.orchestrator.scenario.overrides import with_words
 
 from .page_parts import Assets, Part, ViewerPage, render, static, without_comments
-from .planes import planes_of
+from .phase_planes import planes_of
 from .road import legend_of, notes_of, road_of, without_tyres
-from .viewer_data import PackedRun, is_numeric, pack
+from .viewer_samples import PackedRun, is_numeric, pack
 from .viewer_views import Bound, Mark, View, views_of
 
 SCRIPTS = (

@@ -1,4 +1,4 @@
-// Recorded runs as the page carries them (`viewer_data.py` packs them), and values at a time.
+// Recorded runs as the page carries them (`viewer_samples.py` packs them), and values at a time.
 
 // Start a part of the page when all of it, and all scripts, have been read.
 function ready(start) {
