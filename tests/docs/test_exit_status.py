@@ -14,7 +14,7 @@ from tests.commands.recordings import record_spike, record_step
 from tests.commands.test_batch_commands import SCENARIO, STUDY
 from tests.measured_cars.test_validation import line
 from tests.refusals import mentions
-from yawbench.commands.judged import JudgedCase, to_junit
+from yawbench.commands.strict_and_junit import JudgedCase, to_junit
 from yawbench.metrics.verdict import Status
 
 UNITS = ("driver_sine", "reference_steady_state", "controller_off", "controller_fuzzy_sideslip")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from yawbench.commands.judged import judging
+from yawbench.commands.strict_and_junit import judging
 from yawbench.commands.options import CHANGES, MAKING, RunOptions, executor_of, takes
 from yawbench.commands.output import hold, say, stoppable, tabular
 from yawbench.foundation.errors import ResultsError, ScenarioError

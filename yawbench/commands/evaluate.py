@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from yawbench.commands import output
-from yawbench.commands.judged import judged as pass_on
-from yawbench.commands.judged import judging
+from yawbench.commands.strict_and_junit import judged as pass_on
+from yawbench.commands.strict_and_junit import judging
 from yawbench.commands.output import print_tables, say, tabular
 from yawbench.foundation.errors import ResultsError, ScenarioError
 from yawbench.foundation.messages import counted, listed

@@ -14,7 +14,7 @@ from yawbench.commands import output
 from yawbench.foundation.errors import ScenarioError, YawbenchError
 from yawbench.foundation.messages import counted, listed
 
-from .judged import judged_experiment, judging
+from .strict_and_junit import judged_experiment, judging
 from .options import CHANGES, MAKING, RunOptions, executor_of, named, pooled, takes
 from .output import hold, print_tables, say, say_failed, stoppable, tabular
 

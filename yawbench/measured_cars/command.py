@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from yawbench.commands import output
-from yawbench.commands.judged import judged, judging
+from yawbench.commands.strict_and_junit import judged, judging
 from yawbench.commands.options import CHANGES, MAKING, RunOptions, takes
 from yawbench.commands.output import hold, print_tables, say, stoppable, tabular
 from yawbench.foundation.errors import ScenarioError

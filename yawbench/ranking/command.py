@@ -11,7 +11,7 @@ import typer
 
 from yawbench.commands import output
 from yawbench.commands.experiments import command_of, print_forecasts
-from yawbench.commands.judged import broken_off, judged, judging
+from yawbench.commands.strict_and_junit import broken_off, judged, judging
 from yawbench.commands.options import MAKING, RunOptions, executor_of, named, pooled, takes
 from yawbench.commands.output import hold, print_tables, say, stoppable, tabular
 from yawbench.foundation.errors import ResultsError, ScenarioError
