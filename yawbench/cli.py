@@ -28,7 +28,7 @@ from yawbench.foundation.interrupts import terminable
 from yawbench.foundation.messages import cut, printable
 
 from . import command_help
-from .commands import output
+from .commands import json_and_latex
 
 COMPLETION = "_YAWBENCH_COMPLETE"
 """Environment variable by which a shell asks for completions; the name is click's."""
@@ -71,7 +71,7 @@ def _usage_noted() -> Iterator[None]:
         yield
     except Exception as error:
         if message := getattr(error, "format_message", None):
-            output.note([Diagnostic("option-invalid", message())])
+            json_and_latex.note([Diagnostic("option-invalid", message())])
         raise
 
 
@@ -105,7 +105,7 @@ def _application(arguments: Sequence[str] = (), *, whole: bool = False) -> typer
     for name in called if alone else plugins.names("command"):
         if whole or name in called:
             command = plugins.find("command", name)
-            app.command(name)(output.with_forms(command) if hasattr(command, "tabular") else command)
+            app.command(name)(json_and_latex.with_forms(command) if hasattr(command, "tabular") else command)
         else:
             app.command(name, help=command_help.first_line(name))(_nothing)
     return app
@@ -145,7 +145,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     _make_printable()
     if not os.environ.get(TRACEBACK):  # ignore errors raised in destructors of libraries
         sys.unraisablehook = lambda _: None
-    with terminable(), output.printing(sys.argv[1:] if arguments is None else arguments) as printed:
+    with terminable(), json_and_latex.printing(sys.argv[1:] if arguments is None else arguments) as printed:
         status = _status(sys.argv[1:] if arguments is None else arguments)
     status = _status_of_printing(printed, status)
     if arguments is None and threading.active_count() == 1:
@@ -196,7 +196,7 @@ def _status(arguments: Sequence[str]) -> int:
     return 1
 
 
-def _status_of_printing(printed: output.Output, status: int) -> int:
+def _status_of_printing(printed: json_and_latex.Output, status: int) -> int:
     """Print a command's output; return the exit status."""
     try:
         printed.print(status)
@@ -215,7 +215,7 @@ TRACEBACK = "YAWBENCH_TRACEBACK"
 
 
 def _print_errors(diagnostics: Sequence[Diagnostic]) -> None:
-    output.note(diagnostics)
+    json_and_latex.note(diagnostics)
     for diagnostic in diagnostics:
         print(cut(str(diagnostic), LONGEST_MESSAGE), file=sys.stderr)
 

@@ -15,7 +15,8 @@ from tests.fmus.fake_fmus import Var, make_fmu, out
 from tests.refusals import each_mentions, mentions, refused, texts_of, told
 from tests.reports.made_up import unpacked
 from yawbench.commands.check import show
-from yawbench.commands.output import print_tables, say
+from yawbench.commands.output import print_tables
+from yawbench.commands.terminal_progress import say
 from yawbench.fmus import zip_members
 from yawbench.foundation.errors import Diagnostic, ScenarioError, YawbenchError
 from yawbench.foundation.safe_files import reading

@@ -18,7 +18,7 @@ from tests.commands.recordings import record_spike, record_step
 from tests.commands.test_batch_commands import SCENARIO, STUDY
 from tests.commands.test_run import FAULTY
 from yawbench.cli import main
-from yawbench.commands import output
+from yawbench.commands import json_and_latex, terminal_progress
 from yawbench.fmus.build import build_component
 from yawbench.foundation import plugins
 from yawbench.foundation.errors import Diagnostic
@@ -51,7 +51,7 @@ def answers(fmus, tmp_path, monkeypatch, capfd):
         said = capfd.readouterr().out
         made: dict[str, Any] = json.loads(said)
         assert made["command"] == command
-        assert made["schema"] == output.VERSION
+        assert made["schema"] == json_and_latex.VERSION
         assert made["status"] == int(ended.value.code or 0)
         return made
 
@@ -210,12 +210,12 @@ def test_latex_is_all_that_is_printed_and_compiles_by_its_shape(fmus, tmp_path, 
 
 def test_a_command_that_takes_long_to_open_fmus_says_so(monkeypatch, capsys):
     before = threading.active_count()
-    monkeypatch.setattr(output, "PATIENCE", 0.01)
-    with output.announced("building"):
+    monkeypatch.setattr(terminal_progress, "PATIENCE", 0.01)
+    with terminal_progress.announced("building"):
         time.sleep(0.1)
     assert capsys.readouterr().err == "building\n"
-    monkeypatch.setattr(output, "PATIENCE", 60.0)
-    with output.announced("building"):
+    monkeypatch.setattr(terminal_progress, "PATIENCE", 60.0)
+    with terminal_progress.announced("building"):
         pass
     assert capsys.readouterr().err == ""
     assert threading.active_count() == before

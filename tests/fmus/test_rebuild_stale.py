@@ -14,7 +14,7 @@ import pytest
 
 from tests.checkout import CODE, ROOT, copy_checkout, run_in
 from tests.refusals import each_mentions, mentions
-from yawbench.commands.output import BUILDING, OPENING
+from yawbench.commands.terminal_progress import BUILDING, OPENING
 from yawbench.fmus import recipe
 from yawbench.fmus.build import build_component, find_recipes
 from yawbench.fmus.native import build as native_build

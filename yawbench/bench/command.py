@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from yawbench.commands.options import RunOptions, takes
-from yawbench.commands.output import say
+from yawbench.commands.terminal_progress import say
 from yawbench.foundation.errors import ResultsError
 
 Served = Annotated[Path, typer.Argument(help="Folder of results.", metavar="FOLDER")]

@@ -9,7 +9,6 @@ from typing import Annotated
 import typer
 
 from yawbench.commands.options import CHANGES, RunOptions, takes
-from yawbench.commands.output import say
 from yawbench.commands.recorded_runs import (
     Labels,
     MeasuredFrom,
@@ -22,6 +21,7 @@ from yawbench.commands.recorded_runs import (
     start_of,
     with_segments,
 )
+from yawbench.commands.terminal_progress import say
 from yawbench.foundation.errors import ResultsError, ScenarioError
 from yawbench.foundation.messages import hint, listed
 

@@ -12,7 +12,7 @@ from yawbench.fmus.build_stamp import Edition
 from yawbench.fmus.compiler import OWN, PLATFORMS, TO_WINDOWS
 from yawbench.fmus.opener import PackagedComponent
 
-from .output import say
+from .terminal_progress import say
 
 Components = Annotated[
     list[str] | None,

@@ -8,14 +8,16 @@ from typing import TYPE_CHECKING, Annotated, TypeVar
 
 import typer
 
-from yawbench.commands import output
+from yawbench.commands import json_and_latex
 from yawbench.foundation.errors import Diagnostic, YawbenchError
 from yawbench.foundation.messages import counted, cut, fold, fold_wires, printable, star
 from yawbench.orchestrator.plan import DEFAULT, ValueOrigin
 from yawbench.vocabulary.wheels import WHEELS, wheels
 
+from .json_and_latex import tabular
 from .options import CHANGES, RunOptions, ScenarioFile, plan_of_scenario, takes
-from .output import print_tables, say, tabular
+from .output import print_tables
+from .terminal_progress import say
 
 if TYPE_CHECKING:
     from yawbench.fmus.fmu import Value
@@ -39,8 +41,8 @@ def check(scenario: ScenarioFile, options: RunOptions, all_: All = False) -> Non
     plan = plan_of_scenario(scenario, options)
     show(plan, scenario, defaults=all_)
     notes = [*plan.diagnostics, *_hidden(plan)]
-    output.note(notes)
-    output.answer(plan=_data_of(plan))
+    json_and_latex.note(notes)
+    json_and_latex.answer(plan=_data_of(plan))
     for diagnostic in notes:
         say(f"note: {diagnostic}")
     for instance in plan.instances:
@@ -122,7 +124,7 @@ def show(plan: Plan, scenario: Path, *, defaults: bool = False) -> None:
 
 
 def _tell(text: str) -> None:
-    if output.form() == "text":
+    if json_and_latex.form() == "text":
         print(printable(text))
 
 

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from yawbench.commands import output
+from yawbench.commands import json_and_latex
 from yawbench.commands.experiments import chapter_of, command_of, conduct, data_of, say_page, write_page
+from yawbench.commands.json_and_latex import tabular
 from yawbench.commands.options import (
     MAKING,
     RunOptions,
@@ -17,7 +18,7 @@ from yawbench.commands.options import (
     pooled,
     takes,
 )
-from yawbench.commands.output import hold, print_tables, tabular
+from yawbench.commands.output import print_tables
 from yawbench.commands.recorded_runs import (
     Labels,
     MeasuredFrom,
@@ -27,6 +28,7 @@ from yawbench.commands.recorded_runs import (
     with_segments,
 )
 from yawbench.commands.run import MetricsOption, metric_names
+from yawbench.commands.terminal_progress import hold
 
 if TYPE_CHECKING:
     from yawbench.figures.display import LabelledRun
@@ -83,7 +85,7 @@ def compare(
     views = compared.views if compared else []
     chapter = chapter_of(findings, folder, command, views=views, measured=recordings, comparison=compared)
     say_page(write_page(chapter, folder))
-    output.answer(experiments=[data_of(findings, folder)])
+    json_and_latex.answer(experiments=[data_of(findings, folder)])
     if findings.failed:
         raise typer.Exit(1)
 

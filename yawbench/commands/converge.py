@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from yawbench.commands.experiments import chapter_of, command_of, conduct, say_page, write_page
+from yawbench.commands.json_and_latex import tabular
 from yawbench.commands.options import (
     CHANGES,
     MAKING,
@@ -15,7 +16,8 @@ from yawbench.commands.options import (
     pooled,
     takes,
 )
-from yawbench.commands.output import hold, print_tables, tabular
+from yawbench.commands.output import print_tables
+from yawbench.commands.terminal_progress import hold
 from yawbench.foundation.errors import ScenarioError
 from yawbench.foundation.messages import hint, listed
 from yawbench.orchestrator.coupling_algorithms import ALGORITHMS

@@ -7,9 +7,11 @@ from typing import Annotated
 
 import typer
 
-from yawbench.commands import output
-from yawbench.commands.output import print_tables, say, tabular
+from yawbench.commands import json_and_latex
+from yawbench.commands.json_and_latex import tabular
+from yawbench.commands.output import print_tables
 from yawbench.commands.recorded_runs import MeasuredFrom
+from yawbench.commands.terminal_progress import say
 from yawbench.foundation.messages import counted
 
 FirstRun = Annotated[Path, typer.Argument(help="Results folder, or measurement file.", metavar="RUN")]
@@ -41,7 +43,7 @@ def diff(first_run: FirstRun, second_run: SecondRun, begin: MeasuredFrom = "0 s"
 
     first, second = read_runs([first_run, second_run], start_of(begin))
     inputs, parted = differences(first.record, second.record), divergence(first, second)
-    output.answer(
+    json_and_latex.answer(
         identical=not (inputs or parted.partings or parted.notes or parted.compares_nothing),
         compared={"signals": parted.compared, "times": parted.times},
         inputs=[{"name": name, "first": ours, "second": theirs} for name, ours, theirs in inputs],
@@ -75,7 +77,7 @@ def _of_studies(first: Path, second: Path) -> None:
     from .recorded_runs import distinct
 
     found = differences(recorded_in(first), recorded_in(second))
-    output.answer(**found.as_data())
+    json_and_latex.answer(**found.as_data())
     print_tables(difference_tables(found, *distinct([first, second])))
     if found.compares_nothing:
         say(f"{first}, {second}: nothing could be compared")

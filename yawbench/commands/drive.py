@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from yawbench.commands.strict_and_junit import judging
+from yawbench.commands.json_and_latex import tabular
 from yawbench.commands.options import CHANGES, MAKING, RunOptions, executor_of, takes
-from yawbench.commands.output import hold, say, stoppable, tabular
+from yawbench.commands.strict_and_junit import judging
+from yawbench.commands.terminal_progress import hold, say, stoppable
 from yawbench.foundation.errors import ResultsError, ScenarioError
 from yawbench.metrics.verdict import NotJudged
 from yawbench.proving_ground.standard_tests import DRIVEN, TESTS

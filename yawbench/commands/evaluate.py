@@ -11,10 +11,12 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from yawbench.commands import output
+from yawbench.commands import json_and_latex
+from yawbench.commands.json_and_latex import tabular
+from yawbench.commands.output import print_tables
 from yawbench.commands.strict_and_junit import judged as pass_on
 from yawbench.commands.strict_and_junit import judging
-from yawbench.commands.output import print_tables, say, tabular
+from yawbench.commands.terminal_progress import say
 from yawbench.foundation.errors import ResultsError, ScenarioError
 from yawbench.foundation.messages import counted, listed
 from yawbench.metrics.verdict import NotJudged, Status, Verdict
@@ -146,7 +148,7 @@ class EvaluatedRuns:
             "series": self.series.data if self.series else None,
         }
         write_whole(self.folder / FILE, json.dumps(data, indent=1))
-        output.answer(folder=self.folder, page=self.folder / PAGE, evaluation=data)
+        json_and_latex.answer(folder=self.folder, page=self.folder / PAGE, evaluation=data)
         if len(self.judged) == 1:
             table = run_table(self.judged[0], self.test.says)
         else:

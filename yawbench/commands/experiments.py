@@ -10,13 +10,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from yawbench.commands import output
+from yawbench.commands import json_and_latex
 from yawbench.foundation.errors import ScenarioError, YawbenchError
 from yawbench.foundation.messages import counted, listed
 
-from .strict_and_junit import judged_experiment, judging
+from .json_and_latex import tabular
 from .options import CHANGES, MAKING, RunOptions, executor_of, named, pooled, takes
-from .output import hold, print_tables, say, say_failed, stoppable, tabular
+from .output import print_tables
+from .strict_and_junit import judged_experiment, judging
+from .terminal_progress import hold, say, say_failed, stoppable
 
 if TYPE_CHECKING:
     from yawbench.figures.display import LabelledRun
@@ -88,7 +90,7 @@ def print_forecasts(options: RunOptions, forecasts: Callable[[Pace], Sequence[Fo
     from yawbench.studies.dry_run import Pace, forecast_table
 
     made = forecasts(Pace())
-    output.answer(forecasts=[asdict(forecast) for forecast in made])
+    json_and_latex.answer(forecasts=[asdict(forecast) for forecast in made])
     print_tables([forecast_table(made, options.jobs or os.cpu_count() or 1)])
 
 
@@ -191,7 +193,7 @@ def write_page(view: StudyPage, folder: Path) -> Path:
 
     page = folder / PAGE
     write_whole(page, render(view))
-    output.answer(page=page)
+    json_and_latex.answer(page=page)
     return page
 
 
@@ -214,7 +216,7 @@ def write_overview(chapters: Sequence[StudyPage], pages: Sequence[Path], folder:
     page = folder / PAGE
     ranking = address(RANKING) if RANKING.is_file() else ""
     write_whole(page, overview_page(chapters, [*map(address, pages)], folder, ranking))
-    output.answer(page=page)
+    json_and_latex.answer(page=page)
     return page
 
 
@@ -288,7 +290,7 @@ def of_files(context: typer.Context, files: Sequence[Path], options: RunOptions)
             where = reach(findings)
             say(f"{experiment.spec.title}: {verdicts}" + f" ({where})" * bool(where))
     say_page(pages[0] if len(pages) == 1 else write_overview(chapters, pages, page))
-    output.answer(experiments=conducted)
+    json_and_latex.answer(experiments=conducted)
     if failed:
         raise typer.Exit(1)
 

@@ -9,8 +9,9 @@ from typing import Annotated, Literal
 
 import typer
 
+from yawbench.commands.json_and_latex import tabular
 from yawbench.commands.options import RunOptions, plan_of_scenario, takes
-from yawbench.commands.output import print_tables, tabular
+from yawbench.commands.output import print_tables
 from yawbench.foundation.errors import ModelDescriptionError
 
 Wanted = Annotated[

@@ -98,7 +98,7 @@ class Live(RunWatch):
         if self._live is not None:
             self._live.update(self._picture(), refresh=True)
             return
-        from .output import say
+        from .terminal_progress import say
 
         numbers = zip(self._names, self._last[1:], self._units, strict=True)
         values = ", ".join(f"{name} {x:.4g} {unit}".rstrip() for name, x, unit in numbers)

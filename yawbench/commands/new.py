@@ -21,7 +21,7 @@ from yawbench.foundation.errors import ScenarioError
 from yawbench.foundation.messages import listed
 
 from .options import completing
-from .output import say
+from .terminal_progress import say
 
 
 def check_name(name: str, *, role: str, taken: Iterable[str]) -> None:

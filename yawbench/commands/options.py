@@ -15,7 +15,8 @@ from yawbench.foundation.errors import ScenarioError
 from yawbench.orchestrator.fault_kinds import KINDS, NO_FAULTS
 from yawbench.orchestrator.results.file_formats import FORMATS
 
-from .output import BUILDING, OPENING, announced, with_options
+from .json_and_latex import with_options
+from .terminal_progress import BUILDING, OPENING, announced
 
 if TYPE_CHECKING:
     from yawbench.fmus.opener import Building
@@ -397,7 +398,7 @@ def executor_of(
     from yawbench.planner import Planner
     from yawbench.studies.executor import Executor, runner_of
 
-    from .output import Terminal
+    from .terminal_progress import Terminal
 
     runner = None if options.no_run else runner_of(options.jobs, options.scheduler)
     planner = Planner(build=options.build)

@@ -11,7 +11,6 @@ import typer
 
 from yawbench.commands.animate import write_view
 from yawbench.commands.options import CHANGES, MAKING, RunOptions, completing_names, takes
-from yawbench.commands.output import say
 from yawbench.commands.recorded_runs import (
     Labels,
     MeasuredFrom,
@@ -24,6 +23,7 @@ from yawbench.commands.recorded_runs import (
     start_of,
     with_segments,
 )
+from yawbench.commands.terminal_progress import say
 from yawbench.foundation.errors import ScenarioError
 from yawbench.foundation.messages import hint, listed
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from yawbench.commands.options import RunOptions
-from yawbench.commands.output import reported, say, stoppable
+from yawbench.commands.terminal_progress import reported, say, stoppable
 from yawbench.foundation.errors import ScenarioError
 from yawbench.foundation.messages import counted
 

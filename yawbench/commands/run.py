@@ -9,12 +9,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from yawbench.commands import output
+from yawbench.commands import json_and_latex
 from yawbench.foundation.errors import Diagnostic, ScenarioError, SimulationError, warnings_in
 from yawbench.foundation.progress import bar
 
+from .json_and_latex import tabular
 from .options import CHANGES, MAKING, RunOptions, ScenarioFile, completing_names, plan_of_scenario, takes
-from .output import print_tables, say, shows_bars, tabular
+from .output import print_tables
+from .terminal_progress import say, shows_bars
 
 if TYPE_CHECKING:
     from yawbench.orchestrator.master.log import Message
@@ -112,7 +114,7 @@ def run(
         )
     metrics = metric_names(metric or ())
     plan = plan_of_scenario(scenario, options, record or ())
-    output.note(plan.diagnostics)
+    json_and_latex.note(plan.diagnostics)
     if named := [name for name in metric or () if name != "standard"]:
         from yawbench.metrics import expressions
 
@@ -159,7 +161,7 @@ def run(
     _say_warnings(info.diagnostics)
     _say_why(info.events)
     say(f"{folder}: {info.rows} rows of {info.columns} variables in {info.wall_time:.2f} s")
-    output.answer(
+    json_and_latex.answer(
         folder=folder, rows=info.rows, columns=info.columns, wall_time=info.wall_time, ended=info.ended
     )
     if metrics:
@@ -170,7 +172,7 @@ def run(
         needed = load_results(folder, only=lambda recorded: columns_for(recorded, metrics))
         print_tables([metrics_of_run(needed, metrics)])
         numbers = evaluate_all(needed, metrics)
-        output.answer(
+        json_and_latex.answer(
             metrics={name: {"value": value.number, "unit": value.unit} for name, value in numbers.items()}
         )
 
@@ -233,14 +235,17 @@ def _say_why(events: Sequence[EventRecord]) -> None:
     from yawbench.events.why import why
 
     reasons = why(events)
-    output.answer(events=[event.model_dump(exclude_unset=True) for event in events], why=[*map(str, reasons)])
+    told = [event.model_dump(exclude_unset=True) for event in events]
+    json_and_latex.answer(events=told, why=[*map(str, reasons)])
+        events=[event.model_dump(exclude_unset=True) for event in events], why=[*map(str, reasons)]
+    )
     if reasons:
         say(f"lost: {'; '.join(map(str, reasons))}")
 
 
 def _say_warnings(diagnostics: Iterable[Diagnostic]) -> None:
     diagnostics = [*diagnostics]
-    output.note(diagnostics)
+    json_and_latex.note(diagnostics)
     for warning in warnings_in(diagnostics):
         say(f"note: {warning}")
 

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from yawbench.commands.output import say
+from yawbench.commands.terminal_progress import say
 from yawbench.foundation.messages import counted
 
 Folders = Annotated[

@@ -12,12 +12,13 @@ from xml.etree import ElementTree
 
 import typer
 
-from yawbench.commands import output
+from yawbench.commands import json_and_latex
 from yawbench.foundation.errors import Diagnostic, ModelDescriptionError
 from yawbench.foundation.messages import fold, listed, printable
 
+from .json_and_latex import tabular
 from .options import RunOptions, takes
-from .output import print_tables, tabular
+from .output import print_tables
 
 if TYPE_CHECKING:
     from yawbench.fmus.fmu import Fmu, Variable
@@ -64,10 +65,10 @@ def show(fmu: Shown, options: RunOptions) -> None:
     limits = [f"{name} {why}" for name, why in opened.refused.items()]
     if opened.lacking:
         limits.append(f"its library does not export {listed(opened.lacking)}")
-    output.note(notes)
+    json_and_latex.note(notes)
     print_tables(table for table in tables if table.rows)
     for line in [*map(str, notes), *limits]:
-        if output.form() == "text":
+        if json_and_latex.form() == "text":
             print(printable(f"not done here: {line}" if line in limits else f"note: {line}"))
 
 

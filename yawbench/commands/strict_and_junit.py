@@ -19,7 +19,7 @@ import typer
 
 from yawbench.foundation.messages import printable
 
-from .output import with_options
+from .json_and_latex import with_options
 
 if TYPE_CHECKING:
     from yawbench.metrics.verdict import Judged, Status, Verdict

@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from yawbench.commands import output
+from yawbench.commands import json_and_latex
+from yawbench.commands.json_and_latex import tabular
 from yawbench.commands.options import CHANGES, MAKING, RunOptions, executor_of, named, pooled, takes
-from yawbench.commands.output import hold, print_tables, stoppable, tabular
+from yawbench.commands.output import print_tables
+from yawbench.commands.terminal_progress import hold, stoppable
 from yawbench.foundation import plugins
 
 if TYPE_CHECKING:
@@ -93,4 +95,4 @@ def tune(context: typer.Context, file: TuningFile, options: RunOptions, seed: Tu
     save(history_figure(experiment, tuned, command), folder / "history")
     charts = [image_of(folder / "history.svg", experiment.spec.title)]
     say_page(write_page(chapter_of(findings, folder, command, results=[table], charts=charts), folder))
-    output.answer(experiments=[data_of(findings, folder)])
+    json_and_latex.answer(experiments=[data_of(findings, folder)])

@@ -8,7 +8,8 @@ from typing import Annotated, Literal
 import typer
 
 from yawbench.commands.options import RunOptions, takes
-from yawbench.commands.output import save_figure, say
+from yawbench.commands.output import save_figure
+from yawbench.commands.terminal_progress import say
 
 TyreAction = Annotated[
     Literal["show"], typer.Argument(help="show: draw forces, moments, stiffnesses and relaxation lengths.")

@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from .json_and_latex import tabular
 from .options import RunOptions, takes
-from .output import print_tables, save_figure, say, tabular
+from .output import print_tables, save_figure
+from .terminal_progress import say
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -7,10 +7,10 @@ from typing import Annotated
 
 import typer
 
-from yawbench.commands import output
+from yawbench.commands import json_and_latex
 from yawbench.commands.options import CHANGES, RunOptions, takes
-from yawbench.commands.output import say
 from yawbench.commands.recorded_runs import Labels, RunSources, folder_of_all, labels_of, read_runs, recorded
+from yawbench.commands.terminal_progress import say
 
 To = Annotated[
     str,
@@ -42,4 +42,4 @@ def export(sources: RunSources, options: RunOptions, to: To, label: Labels = Non
         say(f"{written}: {written.stat().st_size / 1000:.0f} kB")
     if to == "rerun":
         say(f"to look at it, without listening to the network: rerun --bind 127.0.0.1 {file}")
-    output.answer(file=file, runs=labels)
+    json_and_latex.answer(file=file, runs=labels)

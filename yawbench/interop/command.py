@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from yawbench.commands.json_and_latex import tabular
 from yawbench.commands.options import CHANGES, RunOptions, ScenarioFile, plan_of_scenario, takes
-from yawbench.commands.output import print_tables, say, tabular
+from yawbench.commands.output import print_tables
+from yawbench.commands.terminal_progress import say
 from yawbench.foundation.errors import ScenarioError, SimulationError
 from yawbench.foundation.messages import counted, fold, hint, listed, printable
 

@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from yawbench.commands import output
-from yawbench.commands.strict_and_junit import judged, judging
+from yawbench.commands import json_and_latex
+from yawbench.commands.json_and_latex import tabular
 from yawbench.commands.options import CHANGES, MAKING, RunOptions, takes
-from yawbench.commands.output import hold, print_tables, say, stoppable, tabular
+from yawbench.commands.output import print_tables
+from yawbench.commands.strict_and_junit import judged, judging
+from yawbench.commands.terminal_progress import hold, say, stoppable
 from yawbench.foundation.errors import ScenarioError
 from yawbench.foundation.messages import resolved, span
 
@@ -85,7 +87,7 @@ def measured(action: MeasuredAction, file: MeasurementFile, out: FigureFile = No
         print_tables(tables)
         if out is not None:
             draw_measurement(file, measurement, out)
-    output.answer(
+    json_and_latex.answer(
         flaws=[
             {"kind": flaw.kind.value, "signal": flaw.signal, "value": flaw.value, "text": flaw.text}
             | ({"begin": flaw.gap.begin, "end": flaw.gap.end} if flaw.gap else {})
@@ -192,7 +194,7 @@ def fit(context: typer.Context, file: FitFile, options: RunOptions) -> None:
         )
     write_whole(folder / "fit.json", json.dumps(result.data, indent=1, ensure_ascii=False) + "\n")
     write_whole(folder / "vehicle.yaml", vehicle_text(result, folder, planner))
-    output.answer(folder=folder, fit=result.data)
+    json_and_latex.answer(folder=folder, fit=result.data)
     scores = score_table(result)
     scores.notes.append(result.verdict)
     print_tables([*map(parameter_table, result.models), scores])
@@ -281,9 +283,9 @@ def validate(
     write_whole(
         out / "validation.json", json.dumps(validation.as_data(), indent=1, ensure_ascii=False) + "\n"
     )
-    output.answer(folder=out, validation=validation.as_data())
+    json_and_latex.answer(folder=out, validation=validation.as_data())
     notes = tuple(dict.fromkeys((*measurement.notes, *validation.diagnostics)))
-    output.note(notes)
+    json_and_latex.note(notes)
     judged(f"{validation.title}, against {validation.measured}", validation.verdicts.items())
     print_tables([validation_table(validation), conditions_table(validation)])
     for diagnostic in notes:

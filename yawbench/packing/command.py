@@ -7,10 +7,10 @@ from typing import Annotated
 
 import typer
 
-from yawbench.commands import output
+from yawbench.commands import json_and_latex
 from yawbench.commands.experiments import StudyFile, chapter_of, command_of, conduct, write_page
 from yawbench.commands.options import RunOptions, pooled, takes
-from yawbench.commands.output import hold, say
+from yawbench.commands.terminal_progress import hold, say
 from yawbench.foundation.errors import ScenarioError
 from yawbench.foundation.messages import counted, in_bytes
 
@@ -59,4 +59,4 @@ def pack(context: typer.Context, file: StudyFile, options: RunOptions, out: Arch
         f"{archive}: {counted(counts['scenarios'], 'file')}, {counted(counts.get('fmus', 0), 'FMU')}, "
         f"{counted(counts['results'], 'file')} of results, {in_bytes(archive.stat().st_size)}"
     )
-    output.answer(archive=archive, files=counts)
+    json_and_latex.answer(archive=archive, files=counts)

@@ -9,11 +9,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from yawbench.commands import output
+from yawbench.commands import json_and_latex
 from yawbench.commands.experiments import command_of, print_forecasts
-from yawbench.commands.strict_and_junit import broken_off, judged, judging
+from yawbench.commands.json_and_latex import tabular
 from yawbench.commands.options import MAKING, RunOptions, executor_of, named, pooled, takes
-from yawbench.commands.output import hold, print_tables, say, stoppable, tabular
+from yawbench.commands.output import print_tables
+from yawbench.commands.strict_and_junit import broken_off, judged, judging
+from yawbench.commands.terminal_progress import hold, say, stoppable
 from yawbench.foundation.errors import ResultsError, ScenarioError
 from yawbench.foundation.messages import counted, hint
 from yawbench.metrics.verdict import Status, Verdict
@@ -109,7 +111,7 @@ def rank(
         ranked = run_whole(ranking, execute, only=only or ())
         command = command_of("rank", file, quick=quick, controller=controller, condition=condition)
         _write(ranked, folder, command, pooled(context, options))
-    output.answer(folder=folder, page=folder / PAGE, entries=records_in(columns_of_entries(ranked)))
+    json_and_latex.answer(folder=folder, page=folder / PAGE, entries=records_in(columns_of_entries(ranked)))
     _pass_on(score for score in ranked.scores if not only or score.entry in only)
     asked = [score for score in ranked.scores if not (only and score.missing and score.entry not in only)]
     table = table_of(replace(ranked, scores=asked), "gains", "speed lost", "chatter")
@@ -190,7 +192,7 @@ def _rank_by_threats(
     command = command_of("rank", file, quick=quick, controller=controller, condition=[*chosen])
     write_whole(page, threats_page(result, table, folder, command))
     say(f"The page: {page} ({page.stat().st_size / 1e6:.1f} MB)")
-    output.answer(folder=folder, page=page, entries=records_in(table_of_scores(table)))
+    json_and_latex.answer(folder=folder, page=page, entries=records_in(table_of_scores(table)))
     print_tables([main_table(result, table)])
 
 

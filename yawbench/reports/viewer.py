@@ -1,7 +1,7 @@
 """Interactive viewer of runs: signals over time, differences, the road from above; part of a page, or a page.
 
 `viewer` is a part of a page, `assets` are the page's style sheets and scripts. A page needs no server and no
-network. It carries every recorded sample (`viewer_samples`); axes and zooming are those of uPlot, taken from the
+network. It carries every recorded sample (`viewer_samples`); axes and zooming are those of uPlot, from the
 installed package `uplot-python`.
 """
 
