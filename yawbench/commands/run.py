@@ -237,8 +237,6 @@ def _say_why(events: Sequence[EventRecord]) -> None:
     reasons = why(events)
     told = [event.model_dump(exclude_unset=True) for event in events]
     json_and_latex.answer(events=told, why=[*map(str, reasons)])
-        events=[event.model_dump(exclude_unset=True) for event in events], why=[*map(str, reasons)]
-    )
     if reasons:
         say(f"lost: {'; '.join(map(str, reasons))}")
 
