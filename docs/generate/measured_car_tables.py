@@ -14,7 +14,8 @@ import numpy as np
 from scipy.special import stdtr, stdtrit
 
 from yawbench.foundation.messages import listed
-from yawbench.studies.confidence import TAIL, holm, interval, jackknife
+from yawbench.studies.confidence import TAIL, interval, jackknife
+from yawbench.studies.pair_comparisons import holm
 from yawbench.studies.tables import Table
 
 from .published import markdown, pages_with, rows_in, wrapped

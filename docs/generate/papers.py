@@ -21,10 +21,11 @@ from typing import NamedTuple
 
 from yawbench.components.cars.published_cars import PaperA
 from yawbench.metrics.verdict import Status, worded
-from yawbench.studies.axes import OpenValueSpec, VariantSpec, levels_of
+from yawbench.studies.axes import VariantSpec, levels_of
 from yawbench.studies.confidence import TAIL, Bounds
 from yawbench.studies.experiment import LoadedExperiment
 from yawbench.studies.load_experiment import load_experiment
+from yawbench.studies.open_value_schema import OpenValueSpec
 from yawbench.studies.result_files import RECORD, VERDICTS
 from yawbench.studies.result_tables import NO_FLIP, flip_words, share, share_words
 from yawbench.vocabulary.gravity import G

@@ -38,7 +38,8 @@ from yawbench.ranking.threat_scores import (
 from yawbench.ranking.threat_tables import titles_of
 from yawbench.ranking.threats import REFERENCE, SearchPlace, load_threats
 from yawbench.ranking.whole import WholeRanking
-from yawbench.studies.confidence import CONFIDENCE, ToldApart, sign_test
+from yawbench.studies.confidence import CONFIDENCE
+from yawbench.studies.pair_comparisons import ToldApart, sign_test
 from yawbench.studies.tables import Table
 
 from . import matrix_tables, threat_tables

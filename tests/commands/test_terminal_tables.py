@@ -14,7 +14,6 @@ from rich.cells import cell_len
 from tests.commands.terminal import seen_on_terminal
 from yawbench.commands import output
 from yawbench.metrics.expressions import MetricValue
-from yawbench.studies import tables
 from yawbench.studies.tables import Table
 
 ROOT = Path(__file__).parents[2]
@@ -27,7 +26,6 @@ def printed(monkeypatch, capsys):
     """Print tables for a terminal of a width, as every command does, and return the text."""
 
     def text_of(width: int, of: list[Table]) -> str:
-        monkeypatch.setattr(tables, "for_terminal", tables.TerminalTable)
         monkeypatch.setenv("COLUMNS", str(width))
         capsys.readouterr()
         output.print_tables(of)

@@ -18,7 +18,7 @@ from yawbench.foundation.errors import Diagnostic, Location, warnings_in
 from yawbench.orchestrator.plan import Instance, Plan, Wire
 from yawbench.orchestrator.results.run_record import RunRecord
 from yawbench.orchestrator.signal_names import SignalName
-from yawbench.studies.tables import MARK, marked, remarks
+from yawbench.studies.run_remarks import MARK, marked, remarks
 from yawbench.vocabulary.wheels import WHEELS
 
 

@@ -22,7 +22,7 @@ from yawbench.measurements.measurement import load_measurement
 from yawbench.orchestrator.recordings.gaps import gaps_in
 from yawbench.orchestrator.scenario.loader import load_scenario
 from yawbench.planner import Planner
-from yawbench.proving_ground.steering_tests import evaluate_step
+from yawbench.proving_ground.steering_response import evaluate_step
 from yawbench.proving_ground.trace import trace_of
 
 UNITS = ("tyre_linear",)

@@ -17,7 +17,7 @@ from yawbench.measurements.measured_results import load_run
 from yawbench.metrics.verdict import NotJudged, Status, Verdict, apart
 from yawbench.proving_ground.sine_with_dwell import amplitudes, evaluate_dwell, is_series, judge_series
 from yawbench.proving_ground.standard_tests import Evaluation
-from yawbench.proving_ground.steering_tests import G, characteristic_angle, evaluate_slow_steer
+from yawbench.proving_ground.steady_state_steering import G, characteristic_angle, evaluate_slow_steer
 from yawbench.proving_ground.trace import Trace, trace_of
 
 A, LARGE = radians(36.0), radians(270.0)

@@ -19,14 +19,10 @@ from yawbench.orchestrator.results.reader import Results
 from yawbench.orchestrator.results.run_record import RunRecord
 from yawbench.orchestrator.scenario.catalogue import SHIPPED
 from yawbench.proving_ground.braking_and_wind import evaluate_turn
+from yawbench.proving_ground.double_lane_change import evaluate_lane_change, judge_entry_speeds
 from yawbench.proving_ground.standard_tests import Evaluation
-from yawbench.proving_ground.steering_tests import (
-    evaluate_lane_change,
-    evaluate_step,
-    evaluate_sweep,
-    evaluate_understeer,
-    judge_entry_speeds,
-)
+from yawbench.proving_ground.steady_state_steering import evaluate_understeer
+from yawbench.proving_ground.steering_response import evaluate_step, evaluate_sweep
 from yawbench.proving_ground.trace import Trace, trace_of
 from yawbench.tyre_stand import cornering_stiffness
 from yawbench.vocabulary.wheels import WHEELS

@@ -29,7 +29,7 @@ from yawbench.ranking.threat_scores import (
 )
 from yawbench.ranking.threat_tables import car_tables
 from yawbench.ranking.threats import LoadedThreats, QuantitySpec, SearchPlace, ThreatSpec, load_threats
-from yawbench.studies.executor import side_by_side
+from yawbench.studies.limit_search import side_by_side
 
 UNITS = (
     "driver_sine_with_dwell", "reference_steady_state", "controller_off", "controller_fuzzy_pid",

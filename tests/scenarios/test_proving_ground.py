@@ -11,9 +11,10 @@ from yawbench._scenario import Scenario
 from yawbench.metrics.verdict import Status
 from yawbench.orchestrator.plan import Override
 from yawbench.orchestrator.scenario.catalogue import SHIPPED
+from yawbench.proving_ground.double_lane_change import evaluate_lane_change
 from yawbench.proving_ground.sine_with_dwell import evaluate_dwell
 from yawbench.proving_ground.standard_tests import Evaluation
-from yawbench.proving_ground.steering_tests import evaluate_lane_change, evaluate_slow_steer
+from yawbench.proving_ground.steady_state_steering import evaluate_slow_steer
 from yawbench.proving_ground.trace import trace_of
 
 pytestmark = pytest.mark.exhaustive

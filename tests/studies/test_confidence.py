@@ -11,14 +11,11 @@ from scipy import stats
 from yawbench.studies.confidence import (
     crossed_interval,
     crossed_probability,
-    holm,
     interval,
     jackknife,
     share_bounds,
-    shared_places,
-    sign_test,
-    told_apart,
 )
+from yawbench.studies.pair_comparisons import holm, shared_places, sign_test, told_apart
 
 
 def test_the_interval_is_that_of_students_t_test():

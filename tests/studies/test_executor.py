@@ -14,9 +14,10 @@ from yawbench.foundation import workers
 from yawbench.foundation.errors import Diagnostic, ResultsError, ScenarioError
 from yawbench.orchestrator.plan import Override
 from yawbench.studies.axes import DesignAxisSpec, Level, axis_of_levels
-from yawbench.studies.executor import Executor, highest_passing, runner_of, side_by_side
+from yawbench.studies.executor import Executor, runner_of
 from yawbench.studies.experiment import NamedRun, experiment_of
 from yawbench.studies.jobs import MeasuredRun, Outcome, run_job
+from yawbench.studies.limit_search import highest_passing, side_by_side
 
 UNITS = ("sensor_ideal",)
 GAIN = "sensor.yaw_rate_gain"

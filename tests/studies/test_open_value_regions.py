@@ -19,13 +19,13 @@ from yawbench.metrics.verdict import Status, Verdict, all_of, compare, not_judge
 from yawbench.planner import Planner
 from yawbench.studies.claim_schema import Claim
 from yawbench.studies.claims import Region, judge
-from yawbench.studies.confidence import SequentialTest
 from yawbench.studies.experiment import plan_experiment
 from yawbench.studies.experiment_result import ExperimentResult
 from yawbench.studies.jobs import MeasuredRun
 from yawbench.studies.load_experiment import load_experiment
 from yawbench.studies.open_value_regions import judge_region, next_jobs, plan_region, runs_of
 from yawbench.studies.result_tables import region_words, verdict
+from yawbench.studies.sequential_test import SequentialTest
 
 SCENARIO = """
 title: A sine

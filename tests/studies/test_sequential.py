@@ -11,10 +11,11 @@ import pytest
 
 from tests.checkout import ROOT
 from tests.markdown import table_in
-from yawbench.studies.axes import RegionSpec
 from yawbench.studies.claims import ONE_IN
-from yawbench.studies.confidence import Decision, SequentialTest, share_bounds
+from yawbench.studies.confidence import share_bounds
+from yawbench.studies.open_value_schema import RegionSpec
 from yawbench.studies.sampling import hypercube
+from yawbench.studies.sequential_test import Decision, SequentialTest
 
 PAGE = ROOT / "docs" / "regions.md"
 CLAIMS = 1000

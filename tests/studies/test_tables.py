@@ -13,7 +13,8 @@ from rich.console import Console
 import yawbench as yb
 from yawbench.figures.latex import escaped
 from yawbench.metrics.expressions import MetricValue
-from yawbench.studies.tables import Table, column, for_terminal, to_csv, to_latex, to_pandas
+from yawbench.studies.tables import Table, column, to_csv, to_latex, to_pandas
+from yawbench.studies.terminal_tables import TerminalTable
 from yawbench.studies.uncertainty import SAMPLE_TABLES
 
 
@@ -55,7 +56,7 @@ def test_plain_numbers_of_a_column_are_shown_with_its_unit():
 def test_a_table_is_the_same_on_the_terminal_and_in_latex(runs):
     console = Console(width=100)
     with console.capture() as printed:
-        console.print(for_terminal(runs))
+        console.print(TerminalTable(runs))
     latex = to_latex(runs)
     for cell in ("28.6 ", "2.00 m", "12", "made in 1 s", "Runs"):
         assert all(cell in text for text in (printed.get(), latex))

@@ -113,7 +113,7 @@ def _angle_driven(scenario: Path, changes: Sequence[Override], execute: Executor
         ResultsError: the runs do not determine it.
         typer.Exit: a run failed.
     """
-    from yawbench.proving_ground.steering_tests import characteristic_angle
+    from yawbench.proving_ground.steady_state_steering import characteristic_angle
     from yawbench.studies.driven_tests import TestDriver, slow_steer_runs
 
     driver = TestDriver(TESTS["slowly-increasing-steer"], scenario, changes, execute)

@@ -137,7 +137,7 @@ class EvaluatedRuns:
         from yawbench.foundation.safe_files import write_whole
         from yawbench.reports.evaluation_page import evaluation_page, events_of_trace
         from yawbench.studies.driven_tests import run_table, runs_table
-        from yawbench.studies.tables import lost_notes
+        from yawbench.studies.run_remarks import lost_notes
 
         drawn = self._draw(each=each, together=together)
         data = {
@@ -247,7 +247,7 @@ def _driven(source: Path, test: StandardTest) -> tuple[list[Path], float | None]
 
 def _apart(places: list[Path]) -> tuple[list[Path], list[Path]]:
     """Return the runs to judge, and those of slowly increasing steer beside them, which give A."""
-    from yawbench.proving_ground.steering_tests import SLOW_STEER
+    from yawbench.proving_ground.steady_state_steering import SLOW_STEER
 
     slow = [place for place in places if SLOW_STEER in place.parts]
     others = [place for place in places if place not in slow]
@@ -298,7 +298,7 @@ def angle_of(text: str | None) -> float | None:
 def _angle(text: str | None, slow_steer: list[Path] | None, test: StandardTest) -> float | None:
     """Return A [rad], None if it is neither given nor needed."""
     from yawbench.measurements.measured_results import load_run
-    from yawbench.proving_ground.steering_tests import characteristic_angle, evaluate_slow_steer
+    from yawbench.proving_ground.steady_state_steering import characteristic_angle, evaluate_slow_steer
     from yawbench.proving_ground.trace import trace_of
 
     if text and slow_steer:

@@ -39,12 +39,12 @@ def print_tables(tables: Iterable[Table]) -> None:
     if form() != "text":
         collect(tables)
         return
-    from yawbench.studies.tables import for_terminal
+    from yawbench.studies.terminal_tables import TerminalTable
 
     screen = console()
     for table in tables:
         screen.print()
-        screen.print(for_terminal(table), crop=False)
+        screen.print(TerminalTable(table), crop=False)
 
 
 def console() -> Console:

@@ -93,7 +93,7 @@ def _tables(cars: list[Handling]) -> list[Table]:
     import math
 
     from yawbench.proving_ground.handling import SPEEDS
-    from yawbench.proving_ground.steering_tests import ACCELERATIONS, G
+    from yawbench.proving_ground.steady_state_steering import ACCELERATIONS, G
     from yawbench.studies.tables import Table
     from yawbench.vocabulary.roles import without_role
 

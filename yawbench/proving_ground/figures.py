@@ -11,9 +11,9 @@ from yawbench.figures.style import CHANGED, QUIET, frame, line_style, new_figure
 from yawbench.metrics.verdict import NotJudged, Status, worded
 from yawbench.vocabulary.lane_change import Lane, lanes_of
 
+from .double_lane_change import CLEAN
 from .sine_with_dwell import AT, FAR, RATIOS, DwellCourse, conclusion, course_of, percent
 from .standard_tests import Evaluation, TestSeries
-from .steering_tests import CLEAN
 from .trace import Trace, at
 
 if TYPE_CHECKING:

@@ -2,7 +2,7 @@
 
 A vehicle file is driven on a plant and tyres, in scenarios generated for it: steered, braked or dropped.
 
-    K(a_y) = d(delta - L r / v_x) / d a_y        in a slowly increasing steer (`evaluation.steering_tests`)
+    K(a_y) = d(delta - L r / v_x) / d a_y        in a slowly increasing steer (`steady_state_steering`)
     v_ch   = sqrt(L / K(0))                      characteristic speed, of an understeering car
     x_k+1  = A x_k + B (delta_k, delta_k+1)      x = (v_y, r), with a roll angle also (phi, dphi)
 
@@ -37,7 +37,7 @@ from yawbench.tyre_stand import KNOWN_BY, open_role
 from yawbench.vocabulary.roles import role_in
 from yawbench.vocabulary.wheels import WHEELS
 
-from .steering_tests import FEWEST, gradients
+from .steady_state_steering import FEWEST, gradients
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

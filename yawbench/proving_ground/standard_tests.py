@@ -248,7 +248,7 @@ TESTS: dict[str, StandardTest] = {
         StandardTest(
             "slowly-increasing-steer",
             "the hand-wheel angle at 0.3 g, from which sine with dwell follows (UN R140, GTR 8)",
-            "steering_tests:evaluate_slow_steer",
+            "steady_state_steering:evaluate_slow_steer",
             ("angle", "slope", "spread", "speed"),
         ),
         StandardTest(
@@ -267,13 +267,13 @@ TESTS: dict[str, StandardTest] = {
         StandardTest(
             "step-steer",
             "gains, response times, overshoots of a step of the hand wheel (after ISO 7401)",
-            "steering_tests:evaluate_step",
+            "steering_response:evaluate_step",
             ("yaw_rate_gain", "yaw_rate_response", "yaw_rate_overshoot", "acceleration_y_response", "t_beta"),
         ),
         StandardTest(
             "frequency-response",
             "gains and phases over frequency, from a sweep of the hand wheel (after ISO 7401)",
-            "steering_tests:evaluate_sweep",
+            "steering_response:evaluate_sweep",
             (
                 "yaw_rate_gain_0.2",
                 "yaw_rate_peak",
@@ -285,7 +285,7 @@ TESTS: dict[str, StandardTest] = {
         StandardTest(
             "understeer-gradient",
             "extra steering per lateral acceleration, of a slow ramp or a constant radius (after ISO 4138)",
-            "steering_tests:evaluate_understeer",
+            "steady_state_steering:evaluate_understeer",
             ("gradient", "gradient_hand", "characteristic_speed", "gradient_4", "largest"),
         ),
         StandardTest(
@@ -309,10 +309,10 @@ TESTS: dict[str, StandardTest] = {
         StandardTest(
             "lane-change",
             "a double lane change between cones, clean or not (ISO 3888)",
-            "steering_tests:evaluate_lane_change",
+            "double_lane_change:evaluate_lane_change",
             ("entry", "exit", "overrun", "sideslip", "acceleration", "hand"),
             drawing="figures:draw_lane_change",
-            driving="steering_tests:drive_lane_changes",
+            driving="double_lane_change:drive_lane_changes",
             driven_as=("iso-3888-1", "iso-3888-2"),
             varies=("speed", "stop_time"),
         ),

@@ -14,7 +14,8 @@ from math import comb
 
 import numpy as np
 
-from yawbench.studies.confidence import ToldApart, crossed_probability, sign_test, told_apart
+from yawbench.studies.confidence import crossed_probability
+from yawbench.studies.pair_comparisons import ToldApart, sign_test, told_apart
 from yawbench.studies.tables import Cell, Table
 
 from .ranking_scores import IDLE, EntryScore, RankedState, apart_by_conditions

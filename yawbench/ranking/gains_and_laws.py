@@ -10,7 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from yawbench.foundation.messages import in_text, listed
-from yawbench.studies.confidence import TAIL, Bounds, crossed_probability, holm, jackknife
+from yawbench.studies.confidence import TAIL, Bounds, crossed_probability, jackknife
+from yawbench.studies.pair_comparisons import holm
 from yawbench.studies.tables import Table
 
 from .ranking import EntrySpec

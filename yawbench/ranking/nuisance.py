@@ -25,10 +25,11 @@ from yawbench.orchestrator.scenario.schema_validation import made
 from yawbench.proving_ground.sine_with_dwell import AMPLITUDE
 from yawbench.studies.axes import Level
 from yawbench.studies.claim_schema import MetricSpec
-from yawbench.studies.confidence import ToldApart, crossed_probability, told_apart
+from yawbench.studies.confidence import crossed_probability
 from yawbench.studies.executor import Executor
 from yawbench.studies.experiment import LoadedExperiment, NamedRun, experiment_of
 from yawbench.studies.jobs import MeasuredRun
+from yawbench.studies.pair_comparisons import ToldApart, told_apart
 from yawbench.studies.tables import Cell, Table, column
 
 from .ranking import (

@@ -48,7 +48,7 @@ from yawbench.orchestrator.scenario.schema_validation import StrictModel, Time, 
 from yawbench.orchestrator.signal_names import Target
 from yawbench.proving_ground.sine_with_dwell import AMPLITUDE, SIDES, amplitudes
 from yawbench.proving_ground.standard_tests import Evaluation
-from yawbench.proving_ground.steering_tests import characteristic_angle, slow_steer_amplitude
+from yawbench.proving_ground.steady_state_steering import characteristic_angle, slow_steer_amplitude
 from yawbench.studies.axes import (
     DesignAxisSpec,
     Level,

@@ -27,19 +27,11 @@ from typing import NamedTuple
 from yawbench.figures.display import digits_apart
 from yawbench.fmus.fmu import Value
 from yawbench.proving_ground.sine_with_dwell import FROM, RATIOS, SLIGHT, SPUN
-from yawbench.studies.confidence import (
-    Bounds,
-    ConfidenceInterval,
-    ToldApart,
-    interval,
-    share_bounds,
-    shared_places,
-    sign_test,
-    told_apart,
-)
+from yawbench.studies.confidence import Bounds, ConfidenceInterval, interval, share_bounds
 from yawbench.studies.executor import Executor
 from yawbench.studies.experiment_result import ExperimentResult
 from yawbench.studies.jobs import STEP_TIME, Job, MeasuredRun
+from yawbench.studies.pair_comparisons import ToldApart, shared_places, sign_test, told_apart
 
 from .ranking import (
     CONTROLLER,

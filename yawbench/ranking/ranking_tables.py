@@ -15,7 +15,8 @@ from yawbench.orchestrator.results.run_folder import load_record
 from yawbench.orchestrator.results.run_record import RUN_FILE
 from yawbench.proving_ground.sine_with_dwell import percent
 from yawbench.studies.jobs import STEP_TIME
-from yawbench.studies.tables import Cell, Column, Table, column, lost_notes
+from yawbench.studies.run_remarks import lost_notes
+from yawbench.studies.tables import Cell, Column, Table, column
 
 from .ranking_scores import (
     Digits,
@@ -28,7 +29,8 @@ from .ranking_scores import (
 )
 
 if TYPE_CHECKING:
-    from yawbench.studies.confidence import ConfidenceInterval, ToldApart
+    from yawbench.studies.confidence import ConfidenceInterval
+    from yawbench.studies.pair_comparisons import ToldApart
 
     from .ranking_scores import RankingResult
 

@@ -20,9 +20,10 @@ from yawbench.orchestrator.scenario.quantities import convert
 from yawbench.orchestrator.signal_names import Target
 from yawbench.proving_ground.sine_with_dwell import AMPLITUDE, amplitudes
 from yawbench.studies.axes import Level, changes_of_file
-from yawbench.studies.executor import Executor, Search, highest_passing, side_by_side
+from yawbench.studies.executor import Executor
 from yawbench.studies.experiment import LoadedExperiment, NamedRun, experiment_of
 from yawbench.studies.jobs import OF_MACHINE, MeasuredRun
+from yawbench.studies.limit_search import Search, highest_passing, side_by_side
 from yawbench.studies.tables import Table, column
 
 from .ranking import CONTROLLER, RECORDED, SERIES, determine_angles

@@ -27,14 +27,8 @@ from typing import NamedTuple
 import numpy as np
 
 from yawbench.studies import derived
-from yawbench.studies.confidence import (
-    Bounds,
-    ToldApart,
-    crossed_interval,
-    crossed_probability,
-    shared_places,
-    told_apart,
-)
+from yawbench.studies.confidence import Bounds, crossed_interval, crossed_probability
+from yawbench.studies.pair_comparisons import ToldApart, shared_places, told_apart
 from yawbench.studies.tables import Table, column
 
 from .threat_runs import ThreatResult

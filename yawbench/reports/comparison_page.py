@@ -10,7 +10,8 @@ from yawbench.figures.display import LabelledRun, digits_of, shown, shown_unit, 
 from yawbench.metrics.expressions import MetricValue, metric
 from yawbench.metrics.measures import variable_of
 from yawbench.studies.experiment_result import ExperimentResult
-from yawbench.studies.tables import Table, marked, remarks
+from yawbench.studies.run_remarks import marked, remarks
+from yawbench.studies.tables import Table
 
 from .divergence import SAME, SEEN, RunComparison, divergence, parting_summary, partings_table
 from .viewer_views import View

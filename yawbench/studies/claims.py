@@ -20,8 +20,9 @@ from yawbench.metrics.expressions import MetricValue
 from yawbench.metrics.verdict import Judged, Status, Verdict, all_of, compare, worst
 
 from .claim_schema import Assertion, Claim, Condition, MetricReference, si_number
-from .confidence import Bounds, Decision, SequentialTest
+from .confidence import Bounds
 from .derived import MetricTable
+from .sequential_test import Decision, SequentialTest
 
 
 @dataclass(frozen=True)

@@ -21,8 +21,9 @@ from yawbench.planner import Planner
 from .claim_schema import MetricSpec, text_of
 from .experiment import LoadedExperiment, NamedRun, experiment_of
 from .experiment_result import ExperimentResult
+from .run_remarks import marked, remarks
 from .schema import FigureSpec
-from .tables import Cell, Table, marked, remarks
+from .tables import Cell, Table
 
 FIGURES = {
     "overview":

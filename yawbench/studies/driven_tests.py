@@ -23,12 +23,13 @@ from yawbench.proving_ground.standard_tests import (
     TestQuantity,
     TestSeries,
 )
-from yawbench.proving_ground.steering_tests import SLOW_STEER, slow_steer_amplitude
+from yawbench.proving_ground.steady_state_steering import SLOW_STEER, slow_steer_amplitude
 from yawbench.proving_ground.trace import Trace, trace_of
 
-from .executor import Executor, highest_passing, side_by_side
+from .executor import Executor
 from .experiment import NamedRun, experiment_of
 from .jobs import Job, planned
+from .limit_search import highest_passing, side_by_side
 from .tables import Cell, Table
 
 ORIGIN: Final = "standard test"

@@ -3,20 +3,19 @@
 An experiment may depend on the results of earlier ones in the same folder: the next generation of a search,
 amplitudes that are multiples of a measured angle, the next step of a bisection. Such a sequence is a function
 that builds experiments and hands each to an `Executor`. It is deterministic and finished runs are in the
-journal, so calling it again resumes it where it was interrupted. Searches for limits run `side_by_side`: a
-round of all of them is one experiment.
+journal, so calling it again resumes it where it was interrupted.
 """
 
 from __future__ import annotations
 
 import functools
 from array import array
-from collections.abc import Callable, Collection, Generator, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from typing import Any, Protocol
 
 from yawbench.foundation import plugins
 from yawbench.foundation.errors import ResultsError, ScenarioError, YawbenchError
@@ -33,9 +32,6 @@ from .jobs import planned as planned_run
 from .journal import Journal
 from .on_demand import OnDemand
 
-T = TypeVar("T")
-K = TypeVar("K")
-V = TypeVar("V")
 Runner = Callable[[Sequence[Job], OnOutcome], object]
 """Executes jobs and reports each outcome; see `runner_of`."""
 
@@ -221,67 +217,6 @@ def _has_results(job: Job, record: MeasuredRun) -> bool:
     if record.failed:
         return (job.out / RUN_FILE).is_file()
     return job.plan is not None and staleness(job.plan, job.out) is None
-
-
-Search = Generator[V, bool, T]
-"""A search for a limit: yields values, is sent whether each of them passes, and returns its result."""
-
-
-def highest_passing(
-    *, first: float, step: float, resolution: float, least: float, most: float
-) -> Search[float, tuple[float | None, float | None]]:
-    """Search the highest value that passes, in steps and halves; return it and the lowest failing one above.
-
-    None stands for a value that does not exist within the bounds.
-
-    Args:
-        first, step: where the search starts, and its step.
-        resolution: largest difference between the two values at the end.
-        least, most: bounds of the values.
-
-    >>> search = highest_passing(first=50, step=10, resolution=1, least=10, most=200)
-    >>> side_by_side({"x": search}, lambda values: {name: v < 61.3 for name, v in values.items()})
-    {'x': (61.25, 61.875)}
-    """
-    good = bad = None
-    value = min(max(first, least), most)
-    while good is None or bad is None:
-        if (yield value):
-            good, nearer = value, min(value + step, most)
-        else:
-            bad, nearer = value, max(value - step, least)
-        if nearer == value:
-            return good, bad
-        value = nearer
-    while bad - good > resolution:
-        value = 0.5 * (good + bad)
-        if (yield value):
-            good = value
-        else:
-            bad = value
-    return good, bad
-
-
-def side_by_side(
-    searches: Mapping[K, Search[V, T]], passing: Callable[[dict[K, V]], Mapping[K, bool]]
-) -> dict[K, T]:
-    """Run searches in rounds, each a single experiment; return the result of each search.
-
-    Args:
-        searches: name -> search.
-        passing: maps the value that each search asks for in a round to whether it passes.
-    """
-    returned: dict[K, T] = {}
-    answers: Mapping[K, bool | None] = dict.fromkeys(searches)  # None starts a generator
-    while answers:
-        values = {}
-        for name, answer in answers.items():
-            try:
-                values[name] = searches[name].send(answer)  # type: ignore[arg-type]
-            except StopIteration as end:  # noqa: PERF203 - this is how a generator returns
-                returned[name] = end.value
-        answers = passing(values) if values else {}
-    return returned
 
 
 def left_to_do(

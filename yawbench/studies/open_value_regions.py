@@ -22,15 +22,16 @@ from yawbench.orchestrator.signal_names import Target
 from yawbench.orchestrator.wiring.context import found_at
 from yawbench.planner import Planner
 
-from .axes import DesignPoint, Level, OpenValueSpec, changes_at, levels_of, points_at
+from .axes import DesignPoint, Level, changes_at, levels_of, points_at
 from .claim_schema import Claim, MetricReference
 from .claims import ONE_IN, TIMES, LevelVerdict, OpenValueScan, Region, judge
-from .confidence import Decision, SequentialTest
 from .derived import derive, ranked
 from .experiment import RUNS, LoadedExperiment, NamedRun, PlannedExperiment, metrics_of, number_of
 from .experiment_result import ExperimentResult
 from .jobs import Job, MeasuredRun, keyed, ready
+from .open_value_schema import OpenValueSpec
 from .sampling import hypercube
+from .sequential_test import Decision, SequentialTest
 
 ORIGIN: Final = "region"
 """Origin of overrides that open values make."""

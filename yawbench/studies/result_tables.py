@@ -21,9 +21,10 @@ from .experiment import NamedRun
 from .experiment_result import ExperimentResult
 from .jobs import NOT_MADE
 from .limits import limit_table
+from .run_remarks import marked, remarks
 from .schema import TableSpec
 from .sections import sections
-from .tables import Cell, Column, Table, marked, remarks
+from .tables import Cell, Column, Table
 from .uncertainty import sample_tables
 
 CARRIES = ("margin", "region", "nearest flip")

@@ -166,7 +166,7 @@ from yawbench.orchestrator.scenario.schema import LIKE_SAYS, Scalar
 from yawbench.orchestrator.scenario.schema_validation import OneOf, StrictModel, exactly_one
 from yawbench.orchestrator.scenario.yaml_lines import KeyPath
 
-from .axes import MOST, SCENARIO, AxisSpec, DesignAxisSpec, OverrideSpec, RegionSpec
+from .axes import MOST, SCENARIO, AxisSpec, DesignAxisSpec, OverrideSpec
 from .claim_schema import LEVELS as VALUES
 from .claim_schema import (
     Alternatives,
@@ -184,6 +184,7 @@ from .claim_schema import (
     QuantityText,
     alternatives,
 )
+from .open_value_schema import RegionSpec
 from .sampling import SAMPLES, runs_of_design
 
 
