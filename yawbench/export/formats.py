@@ -20,9 +20,6 @@ from yawbench.orchestrator.results.run_record import EventRecord
 from yawbench.orchestrator.scenario.overrides import with_changes
 from yawbench.scene.scene import Scene, scene_of
 
-FRAMES = 0.02
-"""Time between two positions of a car in viewers [s]. Chosen: 50 frames a second."""
-
 
 @dataclass(frozen=True)
 class Format:

@@ -23,10 +23,10 @@ from yawbench.events.why import sentence
 from yawbench.foundation.safe_files import write_whole
 from yawbench.metrics.expressions import columns_of
 from yawbench.reports.viewer_views import PANELS
-from yawbench.scene.scene import Scene, quaternions, samples
+from yawbench.scene.scene import FRAMES, Scene, quaternions, samples
 from yawbench.vocabulary.wheels import WHEELS
 
-from .formats import FRAMES, ExportedRun
+from .formats import ExportedRun
 from .shapes import (
     ASPHALT,
     CONE,

@@ -25,10 +25,10 @@ from yawbench.metrics.expressions import columns_of
 from yawbench.metrics.measures import words
 from yawbench.reports.viewer import answer_of
 from yawbench.reports.viewer_views import PANELS
-from yawbench.scene.scene import Scene, samples
+from yawbench.scene.scene import FRAMES, Scene, samples
 from yawbench.vocabulary.wheels import WHEELS
 
-from .formats import FRAMES, ExportedRun
+from .formats import ExportedRun
 from .shapes import (
     ASPHALT,
     CONE,

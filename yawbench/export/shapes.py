@@ -10,10 +10,8 @@ from matplotlib.colors import to_rgb
 
 from yawbench.figures.style import line_style
 from yawbench.scene.outline import CarOutline
-from yawbench.scene.scene import Scene, quaternions, samples
+from yawbench.scene.scene import FRAMES, Scene, quaternions, samples
 from yawbench.vocabulary.wheels import WHEELS
-
-from .formats import FRAMES
 
 Colour = tuple[float, float, float]
 

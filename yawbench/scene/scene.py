@@ -30,6 +30,8 @@ from yawbench.orchestrator.scenario.overrides import with_changes
 from .outline import CarOutline, Places, outline_of, places_of
 from .wheel_motion import friction_of, stacked, steer_of, torques_of, travel_of
 
+FRAMES = 0.02
+"""Time between two positions of a car in viewers [s]. Chosen: 50 frames a second."""
 POSE = {"x": "position_x", "y": "position_y", "yaw": "yaw_angle"}
 """Signals without which there is no scene."""
 
