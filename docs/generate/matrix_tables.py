@@ -12,7 +12,7 @@ from yawbench.ranking.ranking import LoadedRanking, load_ranking
 from yawbench.ranking.ranking_scores import EntryScore, RankedState, RankingCell, RankingResult, placed
 from yawbench.ranking.ranking_tables import interval_words, sign_of
 from yawbench.ranking.settings import AS_IT_IS, SettingScores
-from yawbench.ranking.whole import WholeRanking, with_braking
+from yawbench.ranking.whole_ranking import WholeRanking, with_braking
 from yawbench.studies.confidence import ConfidenceInterval
 from yawbench.studies.jobs import STEP_TIME
 from yawbench.studies.tables import Table

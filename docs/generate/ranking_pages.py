@@ -37,7 +37,7 @@ from yawbench.ranking.threat_scores import (
 )
 from yawbench.ranking.threat_tables import titles_of
 from yawbench.ranking.threats import REFERENCE, SearchPlace, load_threats
-from yawbench.ranking.whole import WholeRanking
+from yawbench.ranking.whole_ranking import WholeRanking
 from yawbench.studies.confidence import CONFIDENCE
 from yawbench.studies.pair_comparisons import ToldApart, sign_test
 from yawbench.studies.tables import Table

@@ -11,7 +11,7 @@ import pytest
 
 from docs.generate import threat_tables
 from tests.command_line import status_of
-from yawbench.ranking.ranking import angle_experiment, angles_of
+from yawbench.ranking.ranked_runs import angle_experiment, angles_of
 from yawbench.ranking.threat_runs import ThreatResult, published_result, survivals
 from yawbench.ranking.threats import load_threats
 from yawbench.studies.executor import Executor, runner_of

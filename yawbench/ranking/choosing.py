@@ -22,7 +22,7 @@ from .ranking_scores import IDLE, EntryScore, RankedState, apart_by_conditions
 from .ranking_tables import share_text
 from .threat_runs import ThreatResult
 from .threat_tables import levels_table
-from .whole import WholeRanking
+from .whole_ranking import WholeRanking
 
 MISLEAD = ("friction", "model", "delay", "noise", "gyro_bias", "mass")
 """Threats that mislead a law: friction and tyres told wrong, late moments, poor sensors, load. Those that a

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from .ranking import EntrySpec
     from .ranking_scores import EntryScore
-    from .whole import WholeRanking
+    from .whole_ranking import WholeRanking
 
 RankingFile = Annotated[
     Path, named("a ranking file", help="Ranking: YAML file, or a name in scenarios/.", metavar="RANKING")
@@ -89,7 +89,7 @@ def rank(
     from .ranking import load_ranking
     from .ranking_page import beside_matrix
     from .ranking_tables import columns_of_entries, lost_cells, table_of
-    from .whole import run_whole
+    from .whole_ranking import run_whole
 
     more = dict(map(_entry, controller or ()))
     if "threats" in (yaml_lines.read(file, what="ranking file").data or {}):

@@ -12,7 +12,8 @@ from yawbench.studies.experiment_result import judge_records
 from yawbench.studies.journal import records_in
 from yawbench.studies.on_demand import OnDemand
 
-from .ranking import LoadedRanking, angle_experiment, angles_of, dwell_experiment
+from .ranked_runs import angle_experiment, angles_of, dwell_experiment
+from .ranking import LoadedRanking
 from .threat_runs import RESOLUTION, STEP
 from .threats import LoadedThreats
 

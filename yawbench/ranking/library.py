@@ -29,7 +29,7 @@ from .ranking import CONTROLLER, EntrySpec, load_ranking
 from .ranking_figures import draw_matrix, draw_pareto
 from .ranking_scores import RankingResult
 from .ranking_tables import columns_of_cells, columns_of_entries
-from .whole import run_whole
+from .whole_ranking import run_whole
 
 if TYPE_CHECKING:
     import pandas as pd

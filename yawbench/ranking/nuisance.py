@@ -32,15 +32,8 @@ from yawbench.studies.jobs import MeasuredRun
 from yawbench.studies.pair_comparisons import ToldApart, told_apart
 from yawbench.studies.tables import Cell, Table, column
 
-from .ranking import (
-    RECORDED,
-    EntrySpec,
-    LoadedRanking,
-    OrdinarySpec,
-    axes_of_repeats,
-    determine_angles,
-    repeats_of,
-)
+from .ranked_runs import axes_of_repeats, determine_angles, repeats_of
+from .ranking import RECORDED, EntrySpec, LoadedRanking, OrdinarySpec
 from .ranking_scores import IDLE
 from .ranking_tables import share_text
 

@@ -65,7 +65,7 @@ from .threat_runs import ThreatResult, published_result
 from .threat_scores import scored
 from .threat_tables import told_apart
 from .threats import load_threats
-from .whole import WholeRanking
+from .whole_ranking import WholeRanking
 
 STATES = {
     RankedState.PASSED: "passed",

@@ -33,15 +33,8 @@ from yawbench.studies.experiment_result import ExperimentResult
 from yawbench.studies.jobs import STEP_TIME, Job, MeasuredRun
 from yawbench.studies.pair_comparisons import ToldApart, shared_places, sign_test, told_apart
 
-from .ranking import (
-    CONTROLLER,
-    OF_EVENTS,
-    RECORDED,
-    EntrySpec,
-    LoadedRanking,
-    determine_angles,
-    dwell_experiment,
-)
+from .ranked_runs import determine_angles, dwell_experiment
+from .ranking import CONTROLLER, OF_EVENTS, RECORDED, EntrySpec, LoadedRanking
 
 UNHELD = 1.0
 """Yaw-rate ratio without a second peak after the reversal: the car keeps turning as before."""

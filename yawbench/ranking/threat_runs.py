@@ -26,7 +26,8 @@ from yawbench.studies.jobs import OF_MACHINE, MeasuredRun
 from yawbench.studies.limit_search import Search, highest_passing, side_by_side
 from yawbench.studies.tables import Table, column
 
-from .ranking import CONTROLLER, RECORDED, SERIES, determine_angles
+from .ranked_runs import determine_angles
+from .ranking import CONTROLLER, RECORDED, SERIES
 from .ranking_scores import RankedRun, RankedState
 from .threats import LANE_CHANGE, REFERENCE, LoadedThreats, SearchPlace, ThreatSpec
 
