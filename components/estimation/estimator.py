@@ -7,7 +7,7 @@ An estimator overrides two methods:
 
 Common to all, in this order:
 
-    zero points of gyro and a_y      learned straight ahead                        `estimation.zero_points`
+    zero points of gyro and a_y      learned straight ahead                        `estimation.straight_ahead`
     a_y = (f_y - zero) / (1 + phi_g)        phi_g: roll angle at 1 g               roll compensation
     delta                            delayed like the inertial signals             `mathematics.low_pass`
     v_x                              from wheels and a_x                       `estimation.reference_speed`
@@ -35,7 +35,7 @@ from ..fmi.component import Component
 from ..fmi.variables import output
 from ..mathematics.low_pass import LowPass
 from .reference_speed import ReferenceSpeed
-from .zero_points import ZeroPoints
+from .straight_ahead import ZeroPoints
 
 INPUTS = ("yaw_rate", "acceleration_x", "acceleration_y", "steer_angle", "wheel_speed_*")
 NAMES = (

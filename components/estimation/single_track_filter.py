@@ -29,7 +29,7 @@ from yawbench.vocabulary.gravity import G
 from ..fmi.variables import parameter
 from .dugoff_axle import axle_force
 from .estimator_parameters import EstimatorParameters
-from .zero_points import faded
+from .straight_ahead import faded
 
 SLOWEST = 2.0
 """Reference speed [m/s] of the slip angles of a slower car; chosen: walking pace."""

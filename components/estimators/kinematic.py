@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 from ..estimation.estimator import Estimator
 from ..estimation.estimator_parameters import EstimatorParameters
-from ..estimation.zero_points import faded
+from ..estimation.straight_ahead import faded
 from ..fmi.variables import parameter
 
 

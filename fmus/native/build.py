@@ -36,6 +36,7 @@ from ..compiler import (
 from ..source_archive import source_files
 from . import compare_with_python, ir
 from .emit import emit
+from .postponed import LATER, LONGEST, Effort
 from .specialise import Program, specialise
 from .values import Refused
 
@@ -55,16 +56,10 @@ OF_COMPILER = ("compiler-missing", "compiler-failed")
 """Codes of errors that are the compiler's, and not the component's."""
 STORE = "native"
 """Folder of native libraries in the cache."""
-EFFORTS = "efforts"
-"""Folder of the processor times of builds of native libraries, in the cache."""
-LONGEST = 3.0
-"""Processor time [s] above which a run does not wait for a native library; chosen: runs start within 3 s."""
-MOST_TEXT, MOST_IN_HURRY = 2_000_000, 200_000
-"""Largest number of characters in C of a component, and of one that a run waits for if it was never built;
-chosen: the longest of this project's has 0.9 million, those from 0.2 million on take more than `LONGEST`."""
+MOST_TEXT = 2_000_000
+"""Largest number of characters in C of a component; chosen: the longest of this project's has 0.9 million."""
 MARK = b"branches that yawbench compared:\0"
 """Bytes before the table of branches in a library: MARK of `arithmetic.h`."""
-LATER = "its native library takes longer than a run should wait; 'yawbench build' makes it"
 
 
 @dataclass(frozen=True)
@@ -136,7 +131,7 @@ def native(
         translated: equivalent class for the translator; default: the component.
         unnamed: a file whose lines are not mentioned in the reason.
         read: files that its modules read when they are imported, with file and line.
-        hurry: postpone the build if the last one took longer than `LONGEST`, or this one will.
+        hurry: postpone the build if it takes long (see `postponed`).
         closed: end calls with an error in branches that were never compared with Python; for whoever can
             then go on in Python. Others are told of these branches.
         limit: largest processor time [s] of the comparison.
@@ -147,9 +142,8 @@ def native(
         return Native(why_not=f"native libraries are built on Linux on x86-64, this is {platform.system()}")
     try:
         compiler_version(compiler_command())
-        entry = hashlib.sha256(component.fmu_name.encode()).hexdigest()
-        effort = recall(EFFORTS, entry)
-        if hurry and float(effort or 0.0) > LONGEST:
+        effort = Effort(component.fmu_name)
+        if hurry and effort.takes_long:
             return Native(why_not=LATER, later=True)
         for opened, where in read:
             raise Refused(f"{opened} is read at every import, and may change after the build", where)
@@ -158,12 +152,12 @@ def native(
         text = emit(program, source, guid)
         if len(text) > MOST_TEXT:
             raise Refused(f"its translation to C is too long ({len(text) / 1e6:.1f} million characters)")
-        if hurry and effort is None and len(text) > MOST_IN_HURRY:
+        if hurry and effort.will_take_long(text):
             return Native(why_not=LATER, later=True)
         make = partial(_made, text, component, guid, resources, _thresholds(program))
         made = _let_through(text, make, limit, hurry)
         if made.new:
-            keep(EFFORTS, entry, str(_processor_time() - began).encode())
+            effort.note(_processor_time() - began)
         if closed or made.why_not:
             return made
         sources = _sources(component.fmu_name, text)

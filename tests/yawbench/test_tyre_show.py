@@ -7,8 +7,8 @@ import pytest
 
 from tests.command_line import status_of
 from tests.components.stand import Stand as Bench
-from tests.orchestrator.tir_files import write
 from tests.refusals import each_mentions, mentions
+from tests.vehicles.tir_files import write
 from yawbench.components.tyres.magic_formula_62 import MagicFormula62
 from yawbench.tyre_stand import WheelState, draw_tyre, put_on_stand, stiffnesses
 from yawbench.vehicles.tir import read_tir

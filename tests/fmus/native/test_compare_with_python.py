@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from tests.refusals import mentions
-from yawbench.fmus.native import build, compare_with_python
+from yawbench.fmus.native import build, compare_with_python, postponed
 from yawbench.fmus.native.compare_with_python import SEARCH, Compared, Native, differences
 from yawbench.fmus.native.emit import emit
 from yawbench.fmus.native.ir import ALONE, INEXACT
@@ -164,13 +164,13 @@ def test_a_run_waits_neither_for_a_long_translation_nor_for_a_long_comparison(
         raise TimeoutError("it takes long")
 
     if slow == "by its length":
-        monkeypatch.setattr(build, "MOST_IN_HURRY", 1000)
+        monkeypatch.setattr(postponed, "MOST_TEXT", 1000)
     else:
         monkeypatch.setattr(build.compare_with_python, "differences", too_long)
     law = translated()
-    assert law.built(hurry=True).why_not == build.LATER
-    assert asked == ([] if slow == "by its length" else [int(build.LONGEST)])
-    assert law.built(hurry=True).why_not == build.LATER  # by now its effort is known, or still expected
+    assert law.built(hurry=True).why_not == postponed.LATER
+    assert asked == ([] if slow == "by its length" else [int(postponed.LONGEST)])
+    assert law.built(hurry=True).why_not == postponed.LATER  # by now its effort is known, or still expected
     later = law.built(hurry=False)
     assert later.why_not == ("" if slow == "by its length" else "it takes long")
 

@@ -1,4 +1,4 @@
-"""Zero points of gyro and lateral accelerometer, learned while a car drives straight ahead.
+"""What is known while a car drives straight ahead: zero points of gyro and accelerometer, and no sideslip.
 
 Straight ahead means that |delta|, |r| and |a_y| as measured are below thresholds for some time. The zero
 points are then the mean of the measurements, at first of all of them, later with a long memory
@@ -6,7 +6,7 @@ points are then the mean of the measurements, at first of all of them, later wit
     b <- b + max(1 / n, h / memory) (y - b)
 
 The zero point of the accelerometer includes the bank of the road. Zero points are limited to plausible
-values.
+values. An estimated v_y fades while the car goes on straight ahead.
 """
 
 from .estimator_parameters import EstimatorParameters

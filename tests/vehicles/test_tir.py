@@ -9,8 +9,8 @@ from math import isfinite
 
 import pytest
 
-from tests.orchestrator.tir_files import UNITS, text_of, write
 from tests.refusals import each_mentions, mentions, refused, texts_of
+from tests.vehicles.tir_files import UNITS, text_of, write
 from yawbench.components.tyre_models.pacejka_2012_set import COMMON, LONGITUDINAL, REST
 from yawbench.foundation.errors import ScenarioError
 from yawbench.vehicles.tir import read_tir

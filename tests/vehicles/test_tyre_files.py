@@ -13,8 +13,8 @@ import pytest
 from tests.cars import load_scenario, make_plan
 from tests.changed import changed
 from tests.command_line import status_of
-from tests.orchestrator.tir_files import write
 from tests.refusals import mentions, refused, texts_of
+from tests.vehicles.tir_files import write
 from yawbench.foundation.errors import ScenarioError, WiringError, warnings_in
 from yawbench.interop.ssp_write import write_ssp
 from yawbench.orchestrator.results.folder_names import default_folder
