@@ -12,7 +12,7 @@ from campaigns.result_folders import cases, trial
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="needs links and pipes")
 
 
-@pytest.mark.exhaustive  # tests/orchestrator/test_foreign_results.py and test_results.py read such folders
+@pytest.mark.exhaustive  # tests/orchestrator/test_hostile_folders.py and test_results.py read such folders
 def test_what_reads_a_folder_of_somebody_else_answers_and_changes_nothing(tmp_path: Path) -> None:
     chosen = cases()[::397]
     tally = trial(chosen, tmp_path)

@@ -1,9 +1,4 @@
-"""Runs of a ranking: two experiments, the steering angle A of every car, and sine with dwell.
-
-The first determines A on a dry road without control, so that all controllers drive the same amplitudes. In
-the second, conditions are named runs; entry, repeats and amplitude (positive: left first) are axes.
-`ranking_scores` computes scores from its result.
-"""
+"""Runs of a ranking: two experiments, the steering angle A of every car, and sine with dwell."""
 
 from __future__ import annotations
 

@@ -18,7 +18,10 @@ A condition overrides its scenario like a run of a study. An entry swaps its FMU
 `controller` and sets its parameters, the same in all conditions; `swap` swaps in what belongs to it beside
 the controller, such as an allocator.
 
-`ranked_runs` makes its runs, `ranking_scores` computes scores from them.
+A ranking is two experiments (`ranked_runs`). The first determines the steering angle A of every car, on a
+dry road without control, so that all controllers drive the same amplitudes. In the second, conditions are
+named runs; entry, repeats and amplitude (positive: left first) are axes. `ranking_scores` computes scores
+from its result.
 """
 
 from __future__ import annotations
