@@ -52,6 +52,7 @@ from .context import WiringContext
 from .control_side import exact
 from .domain import Domain
 from .faults import faults_of
+from .instance_steps import doubtful_steps
 from .order import EvaluationOrder, evaluate
 from .parameters import value_for
 
@@ -270,7 +271,11 @@ def make_plan(
         title=scenario.title,
         scenario=scenario.as_run(),
         changes=scenario.changes,
-        diagnostics=(*notes, *domain.warnings(scenario, instances)),
+        diagnostics=(
+            *notes,
+            *domain.warnings(scenario, instances),
+            *doubtful_steps(scenario, instances.values()),
+        ),
         faults=faults,
     )
 

@@ -20,7 +20,7 @@ import yawbench as yb
 from tests.orchestrator import recorded
 from tests.refusals import mentions, refused
 from tests.trees import snapshot
-from yawbench.foundation.errors import ResultsError
+from yawbench.foundation.errors import ResultsError, YawbenchError
 from yawbench.foundation.safe_files import LOCK_FILE, NEW
 from yawbench.orchestrator.results.folder_lock import FolderLock, holder_of
 from yawbench.orchestrator.results.folder_names import below_results
@@ -192,7 +192,21 @@ def test_a_command_that_reads_changes_nothing_but_its_own_product(command, what,
     assert without_products(snapshot(work)) == inside
 
 
-@pytest.mark.parametrize("planted", PLANTS.values(), ids=PLANTS)
+each_plant = pytest.mark.parametrize("planted", PLANTS.values(), ids=PLANTS)
+
+
+@each_plant
+def test_the_library_reads_without_changing_anything(planted, work, home):
+    plant(work / "theirs", home, **planted)
+    before = snapshot(work, home)
+    try:
+        yb.open("theirs").metrics()
+    except YawbenchError as error:
+        assert "theirs" in str(error)
+    assert snapshot(work, home) == before
+
+
+@each_plant
 def test_salvage_and_the_next_run_repair_inside_the_folder_alone(planted, work, home):
     plant(work / "theirs", home, **planted)
     before = snapshot(home, work / "good")
@@ -211,6 +225,23 @@ def test_salvage_and_the_next_run_repair_inside_the_folder_alone(planted, work, 
         left = {path.name for path in (work / "theirs").iterdir()}
         assert not left & {"run.json.part", "results.csv.part", LOCK_FILE}
     assert snapshot(home, work / "good") == before
+
+
+def test_what_a_dead_run_left_is_shown_and_neither_removed_nor_moved(work, home, yawbench):
+    plant(work / "theirs", home, **PLANTS["results elsewhere"])
+    before = snapshot(work)
+    status, out, _ = yawbench("list", "runs", "theirs")
+    assert status == 0
+    assert "died" in out
+    assert snapshot(work) == before
+
+
+def test_looking_who_holds_a_folder_changes_nothing_there(work):
+    lock = FolderLock(work / "theirs")
+    before = snapshot(work)
+    assert f"process {os.getpid()} " in holder_of(work / "theirs")
+    assert snapshot(work) == before
+    lock.release()
 
 
 def test_a_link_is_replaced_by_the_figure_unless_the_user_names_it(work, home, yawbench):
@@ -342,6 +373,23 @@ def test_nor_where_it_writes_drafts_and_folders(command, projects, products, lin
     assert status == 2
     assert mentions(said, "locked", "results", "symbolic")
     assert snapshot(home) == before
+
+
+@pytest.mark.parametrize("command", ["run", "study"])
+def test_results_of_a_file_above_go_below_results(command, projects, work, monkeypatch):
+    sub = work / "sub"
+    sub.mkdir()
+    (work / "base").mkdir()
+    (work / "base" / "results.csv").write_text("own\n")
+    before = snapshot(work)
+    monkeypatch.chdir(sub)
+    file, *more = MAKES[command]
+    monkeypatch.setitem(MAKES, command, (f"../{file}", *more))
+    assert projects(command)[0] == 0
+    after = snapshot(work)
+    others = {path for path in after if not Path(path).is_relative_to(sub)}
+    assert {path: after[path] for path in others} == {path: before[path] for path in others}
+    assert [folder.name for folder in (sub / "results").iterdir()] == [work.name]
 
 
 def test_results_of_several_files_go_below_the_folder_given(projects, work, monkeypatch):

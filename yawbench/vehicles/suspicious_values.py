@@ -1,4 +1,4 @@
-"""Warnings about suspicious values: implausible, conflicting, left over from another car, or of steps.
+"""Warnings about suspicious values: implausible, conflicting, or left over from another car.
 
 Implausible are values outside the ranges of `vocabulary.vehicle` and `PLAUSIBLE`: a mass in grams, a
 wheelbase in mm, an angle in degrees. Defaults of FMUs are not checked: they are the responsibility of their
@@ -19,7 +19,7 @@ from yawbench.foundation.errors import Diagnostic, Location
 from yawbench.foundation.messages import fold, listed
 from yawbench.orchestrator.plan import DEFAULT, OF_FILES, Given, Instance, OriginKind
 from yawbench.orchestrator.scenario.loader import LoadedScenario
-from yawbench.orchestrator.scenario.quantities import exact_text, meant_unit, number_and_unit
+from yawbench.orchestrator.scenario.quantities import meant_unit, number_and_unit
 from yawbench.vocabulary.facts import FACTS
 from yawbench.vocabulary.roles import without_role
 
@@ -41,8 +41,6 @@ SAME = 1e-9
 """Relative difference of values that count as equal: rounding of a conversion."""
 RADIUS = 0.03
 """Tolerated relative difference of wheel and tyre radius. Chosen: the load changes it by 1 to 2 %."""
-STEP_TOLERANCE = 1e-6
-"""Relative difference up to which two steps are the same; chosen: FMUs round theirs to as few digits."""
 
 
 class GivenValue(NamedTuple):
@@ -98,7 +96,6 @@ def suspicious_values(scenario: LoadedScenario, instances: Mapping[str, Instance
         *_other_cars(scenario, parameters),
         *_of_tyres(scenario, instances, parameters),
         *_implausible([*of_car, *_of_instances([*parameters, *constants])]),
-        *_steps(scenario, instances.values()),
     ]
 
 
@@ -157,33 +154,6 @@ def _of_instances(given: Iterable[GivenValue]) -> Iterator[_Quantity]:
             yield _Quantity(item.signal, name, item.value, item.written, unit, CAR[name].plausible)
         elif not item.unit and (known := PLAUSIBLE.get(name, PLAUSIBLE.get(unit))):
             yield _Quantity(item.signal, name, item.value, item.written, unit, known[:2], known[2])
-
-
-def _steps(scenario: LoadedScenario, instances: Iterable[Instance]) -> Iterator[Diagnostic]:
-    """Yield a warning for every instance whose step is longer than the run, or not that of its FMU."""
-    lasts = scenario.stop_time - scenario.start_time
-    for instance in instances:
-        signal, fixed = f"{instance.name}.step_size", instance.fmu.fixed_step
-        step = instance.period * scenario.step_size
-        if step > lasts:
-            says = (
-                f"{instance.name} never takes a step: its step_size, {float(step):g} s, is longer than the "
-                f"run, {float(lasts):g} s; its outputs keep their initial values"
-            )
-            yield _warning("instance-never-steps", signal, says, float(step))
-        if fixed is None:
-            continue
-        times = round(float(step) / fixed) if instance.fmu.takes_multiples else 1
-        if not math.isclose(step, max(times, 1) * fixed, rel_tol=STEP_TOLERANCE):
-            own = exact_text(Fraction(repr(fixed)))
-            base = "" if Fraction(repr(fixed)) % scenario.step_size == 0 else f"--set step_size={own} "
-            says = (
-                f"{instance.name} ({instance.fmu.name}) declares "
-                f"{'an internal' if instance.fmu.takes_multiples else 'a fixed'} step of {own} s and runs "
-                f"with one of {exact_text(step)} s, so its results may be wrong; "
-                f"'{base}--set {signal}={own}' gives it that step"
-            )
-            yield _warning("instance-step-differs", signal, says, float(step))
 
 
 def _of_tyres(
