@@ -294,7 +294,8 @@ def test_runs_in_one_process_leave_nothing_behind(fmus, tmp_path, monkeypatch):
         for _ in range(8):
             simulate(plan, tmp_path / "out")
         seen.append(left_behind())
-    assert seen[0][1] == seen[2][1]
+    # what is left by each of 16 runs is more than what threads of earlier tests open and close meanwhile
+    assert all(after - before < 8 for before, after in zip(seen[0][1], seen[2][1], strict=True))
     assert seen[2][0] - seen[1][0] <= 8 * len(plan.instances)  # PythonFMU's library loses an object of each
 
 
