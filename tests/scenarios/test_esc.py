@@ -51,14 +51,14 @@ def test_on_a_slippery_road_it_needs_not_be_told():
 )
 @pytest.mark.parametrize("amplitude", [10.0, 30.0])
 def test_on_easy_sines_it_never_acts(vehicle, amplitude):
-    """A sine of 1 and 3 m/s2."""
+    """Sines of 0.8 to 0.95 m/s2 and of 2.4 to 2.8."""
     run = (
         on_the_road(vehicle)
         .swap(driver="driver_sine")
         .set({"driver.amplitude": radians(amplitude), "driver.frequency": 0.5, "stop_time": 4.0})
         .run()
     )
-    assert np.abs(run["plant.acceleration_y"]).max() > 0.08 * amplitude
+    assert np.abs(run["plant.acceleration_y"]).max() > 0.075 * amplitude
     assert run["controller.stability_state"].max() == 0.0
     assert run["controller.brake_preparation"].max() == 0.0
     assert max(run[f"wheel_control.{name}"].max() for name in wheels("brake_pressure_*")) == 0.0

