@@ -211,8 +211,8 @@ def _array(fmu: Fmu, variable: Variable) -> tuple[str, tuple[int, ...], list[Var
     """Return the name, shape and elements of the array that a variable belongs to; a scalar is its own."""
     if variable.elements == 1:
         return variable.name, (), [variable]
-    name = variable.name.rpartition("[")[0]
-    every = [v for v in fmu.variables.values() if v.name.rpartition("[")[0] == name]
+    name = variable.array
+    every = [v for v in fmu.variables.values() if v.array == name]
     return name, tuple(map(int, every[-1].name[len(name) + 1 : -1].split(","))), every
 
 
