@@ -80,8 +80,7 @@ class SharedRows:
     def __init__(self, width: int) -> None:
         self._map = mmap.mmap(-1, 32 + 8 * BLOCK * width)
         self.position = RunPosition.from_buffer(self._map).begin()
-        self.block = np.frombuffer(self._map, float, offset=32).reshape(BLOCK, width)
-        self.rows = list(self.block)
+        self.rows = np.frombuffer(self._map, float, offset=32).reshape(BLOCK, width)
         others = _Others()
         self.others: list[list[Value]] = others
         self.kept = others.kept
@@ -89,7 +88,7 @@ class SharedRows:
     def write(self, count: int) -> None:
         """Send the first `count` rows."""
         if count > 0:
-            self.channel.send("rows", (self.block[:count], list(self.others)))
+            self.channel.send("rows", (self.rows[:count], list(self.others)))
             self.others.clear()
 
 
@@ -185,7 +184,7 @@ class ChildRun(RunLifecycle, Process):
             self.handed_over += len(rows)
             return
         self._sealed = True  # if this fails, later rows must not be written either
-        self._rows.lay(rows)
+        self._rows.rows = rows
         self._rows.others[:] = others
         self._hand_over(len(rows))
         self._sealed = False
@@ -194,10 +193,10 @@ class ChildRun(RunLifecycle, Process):
         """Write the rows that the child has left in shared memory."""
         count = min(max(0, self.position.completed + 1 - self.handed_over), BLOCK)
         others = []
-        if len(self.plan.record) + 1 > self._shared.block.shape[1]:  # some columns are not Real
+        if len(self.plan.record) + 1 > self._shared.rows.shape[1]:  # some columns are not Real
             others = self._shared.kept(count)
             count = len(others)
-        self._record(self._shared.block[:count], others)
+        self._record(self._shared.rows[:count], others)
         self._sealed = True
 
     def check_time(self) -> None:

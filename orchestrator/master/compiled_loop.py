@@ -163,33 +163,29 @@ class CompiledLoop:
         self._expected = outputs.astype(np.int64)
         self.state.expected, self.state.n_expected = _address_of(self._expected), len(outputs)
 
-    def lay(
-        self, points: range, rows: Sequence[np.ndarray], cycle: int, programs: Mapping[int, Sequence[Any]]
-    ) -> None:
+    def lay(self, points: range, rows: np.ndarray, cycle: int, programs: Mapping[int, Sequence[Any]]) -> None:
         """Set what the next walks are for.
 
         Args:
             points: communication points to be stepped to.
-            rows: one per point, all at the same distance in memory.
+            rows: one per point; shape (at least as many, columns).
             cycle: the programs repeat after this number of points.
             programs: phase of the cycle -> the operations of a step, whose `data` describe them.
 
         Raises:
-            ValueError: `rows` are too few, or not at the same distance.
+            ValueError: `rows` are too few.
         """
         for phase in [phase for phase, (made_of, _) in self._programs.items() if phase not in programs]:
             del self._programs[phase]
         addresses = [self._address(k % cycle, programs[k % cycle]) for k in points[:cycle]]
         self._table = (ctypes.c_void_p * len(addresses))(*addresses)
         self._rows = rows
-        run, n = self.state, len(points)
-        ends = [_address_of(row) for row in (*rows[: min(n, 2)], *rows[n - 1 : n])]
-        first, second, last = ends[0], ends[-2], ends[-1]
-        if len(rows) < n or last - first != (second - first) * (n - 1):
-            raise ValueError(f"{n} rows at the same distance are needed")
+        if len(rows) < len(points):
+            raise ValueError(f"{len(points)} rows are needed")
+        run = self.state
         run.programs, run.n_programs = _address_of(self._table), len(addresses)
         run.first, run.k, run.at = points[0], points[0], -1
-        run.rows, run.stride = first, (second - first) // rows[0].itemsize
+        run.rows, run.stride = _address_of(rows), rows.strides[0] // rows.itemsize
 
     def _address(self, phase: int, operations: Sequence[Any]) -> int:
         """Return the address of a program as plain data."""

@@ -52,9 +52,7 @@ class Fmi2Instance(CtypesInstance):
     def _instantiate(self, instance: Instance) -> int | None:
         callbacks = _callbacks()
         callbacks.componentEnvironment = self._listener = listen(self._log, instance.name, callbacks)
-        instantiate = self._function("Instantiate")
-        instantiate.restype = ctypes.c_void_p
-        component: int | None = instantiate(
+        component: int | None = self._function("Instantiate", ctypes.c_void_p)(
             instance.name.encode(),
             fmi2CoSimulation,
             instance.fmu.guid.encode(),
@@ -161,9 +159,7 @@ class Fmi3Instance(CtypesInstance):
         self._answers = _StepAnswers(reached=math.nan)
         resources = str(Path(instance.fmu.directory, "resources").absolute()) + os.sep
         no, yes = False, True
-        instantiate = self._function("InstantiateCoSimulation")
-        instantiate.restype = ctypes.c_void_p
-        component: int | None = instantiate(
+        component: int | None = self._function("InstantiateCoSimulation", ctypes.c_void_p)(
             instance.name.encode(),
             instance.fmu.guid.encode(),
             resources.encode(),

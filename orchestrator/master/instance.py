@@ -297,10 +297,10 @@ class CtypesInstance(FmuInstance, ABC):
     def _has(self, name: str) -> bool:
         return hasattr(self._library, self.prefix + name)
 
-    def _function(self, name: str) -> Any:
+    def _function(self, name: str, result: Any = ctypes.c_int) -> Any:
         """Return a C function; it takes C objects and, of Python's numbers, only integers."""
         function = getattr(self._library, self.prefix + name)  # looked up once, unlike by index
-        function.restype = ctypes.c_int
+        function.restype = result
         return function
 
     def _do(self, name: str, *arguments: Any) -> Status:

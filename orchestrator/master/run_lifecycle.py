@@ -36,7 +36,7 @@ OpenInstance = Callable[[Instance, Log, set[Path]], FmuInstance]
 class RecordedRows(Protocol):
     """Buffer that a run fills: `rows` of Reals, one per communication point, and `others` for other types."""
 
-    rows: list[np.ndarray]
+    rows: np.ndarray
     others: list[list[Value]]
 
     def write(self, count: int) -> None:

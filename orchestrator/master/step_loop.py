@@ -17,7 +17,7 @@ import math
 import os
 import time
 from collections import deque
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from typing import cast
 
 import numpy as np
@@ -169,11 +169,10 @@ class Master:
             others.append(self._values_of_others())
         self.completed = self._position.completed = 0
 
-    def advance(self, end: int, rows: Sequence[np.ndarray], others: list[list[Value]]) -> None:
+    def advance(self, end: int, rows: np.ndarray, others: list[list[Value]]) -> None:
         """Step to communication point `end`, filling one of `rows` per point.
 
-        Rows lie at the same distance in signals. Recorded values that are not Real are appended to `others`,
-        one list per row.
+        Recorded values that are not Real are appended to `others`, one list per row.
 
         Raises:
             SimulationError: an instance fails or a wire is not finite. Rows up to `completed` are complete.
@@ -193,7 +192,7 @@ class Master:
         if self._ending is not None:
             raise self._ending
 
-    def _loop(self, points: range, rows: Sequence[np.ndarray], others: list[list[Value]]) -> None:
+    def _loop(self, points: range, rows: np.ndarray, others: list[list[Value]]) -> None:
         """Step to the points by the loop in Python, the reference."""
         s, p, q = self._grid
         stop, position, cycle = self.stop.flag, self._position, self.program.cycle

@@ -42,8 +42,8 @@ def database_beside(path: Path) -> Path:
     return found[0]
 
 
-def load_database(path: Path) -> Any:
-    """Return a DBC file as cantools has it.
+def load_database(path: Path) -> tuple[Any, bytes]:
+    """Return a DBC file as cantools has it, and its content.
 
     Raises:
         ImportError: cantools is not installed.
@@ -52,17 +52,16 @@ def load_database(path: Path) -> Any:
     """
     import cantools
 
-    text = read_bytes(path, largest=TEXT).decode(
-        "cp1252", errors="replace"
-    )  # as the format's maker writes it
+    content = read_bytes(path, largest=TEXT)
+    text = content.decode("cp1252", errors="replace")  # as the format's maker writes it
     try:
-        return cantools.database.load_string(text, database_format="dbc")
+        return cantools.database.load_string(text, database_format="dbc"), content
     except Exception as error:  # cantools raises whatever its parsing meets
         raise ValueError(f"not understood as DBC: {' '.join(str(error).split())}") from None
 
 
-def read_log(path: Path, raw: bytes) -> list[LoggedSignal]:
-    """Return the signals of a log with the content `raw`, without frames that the DBC file does not know.
+def read_log(path: Path, raw: bytes) -> tuple[list[LoggedSignal], bytes]:
+    """Return those signals of a log with the content `raw` that its DBC file knows, and that file's content.
 
     Raises:
         ValueError: a package or the DBC file is missing, or one of the files is not understood.
@@ -71,7 +70,7 @@ def read_log(path: Path, raw: bytes) -> list[LoggedSignal]:
     try:
         import can
 
-        database = load_database(beside)
+        database, content = load_database(beside)
     except ImportError:
         raise ValueError("CAN logs need python-can and cantools: pip install 'yawbench[can]'") from None
     except (OSError, ValueError) as error:
@@ -97,7 +96,7 @@ def read_log(path: Path, raw: bytes) -> list[LoggedSignal]:
         unit = database.get_message_by_name(of).get_signal_by_name(name).unit
         times, numbers = np.array(rows).T
         signals.append(LoggedSignal(name, of, unit, times, numbers))
-    return signals
+    return signals, content
 
 
 def _frames(can: Any, ending: str, raw: bytes) -> Iterator[Any]:

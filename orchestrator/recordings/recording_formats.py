@@ -25,7 +25,7 @@ from yawbench.foundation.safe_files import read_bytes, reading, reason
 
 from ..results.run_record import RUN_FILE, check_record
 from ..scenario.quantities import Unit, spellings
-from .can_logs import LOGS, database_beside, read_log
+from .can_logs import LOGS, LoggedSignal, read_log
 from .clocks import refuse_infinite
 from .text_tables import MISSING, Mark, read_text_table, split_header
 from .units_of_loggers import factors, stated_unit
@@ -79,19 +79,21 @@ class ColumnFile:
         decimal: Mark | None = None,
     ) -> None:
         raw = read_bytes(path, largest=LARGEST)
-        self.sha256 = hashlib.sha256(raw).hexdigest()
+        digest = hashlib.sha256(raw)
         ending = path.suffix.lower()
         if ending in TEXT:
             self._table = _text(raw, asked, header, decimal)
         elif ending == ".parquet":
             self._table = _parquet(raw)
         elif ending in LOGS:
-            self._table = _can_log(path, raw)
-            self.sha256 = hashlib.sha256(raw + read_bytes(database_beside(path), largest=LARGEST)).hexdigest()
+            signals, database = read_log(path, raw)
+            self._table = _can_log(signals)
+            digest.update(database)
         elif ending in MDF:
             self._table = _mdf(raw, {name.partition("#")[0].strip() for name in asked})
         else:
             raise ValueError(f"must be a file of type {', '.join((*TEXT, '.parquet', *MDF, *LOGS))}")
+        self.sha256 = digest.hexdigest()
         self.notes = self._table.notes
         self._clocks: dict[int, np.ndarray] = {}
         self._names: list[str] = []
@@ -249,9 +251,8 @@ def _mdf(raw: bytes, asked: Collection[str]) -> _Table:
     return _Table(headers, units, sources, values, times=lambda at: signal(at).timestamps)
 
 
-def _can_log(path: Path, raw: bytes) -> _Table:
+def _can_log(signals: Sequence[LoggedSignal]) -> _Table:
     """Return the signals of a log of CAN frames, each with the times of its messages."""
-    signals = read_log(path, raw)
     return _Table(
         [signal.name for signal in signals],
         [stated_unit(signal.unit) for signal in signals],

@@ -43,7 +43,8 @@ class RowBlock:
         self.written = 0
         self.columns = list(columns)
         self._order = [0, *_order(real)]
-        self.lay(np.zeros((BLOCK, 1 + sum(real))))
+        self.rows = np.zeros((BLOCK, 1 + sum(real)))
+        """Memory for the rows; other memory may take its place, shape (at most BLOCK, 1 + Reals)."""
         self.others: list[list[Value]] = []
         self._real = [name for name, is_real in zip(columns, real, strict=True) if is_real]
         self.looks: list[
@@ -51,19 +52,14 @@ class RowBlock:
         ] = []  # observers, called with every block: time, then Reals
         self._extremes = np.full((2, sum(real)), np.nan)
 
-    def lay(self, block: np.ndarray) -> None:
-        """Use this memory as the row buffer from now on; shape (at most BLOCK, 1 + Reals)."""
-        self._block = block
-        self.rows = list(block)
-
     def write(self, count: int) -> None:
         """Record the first `count` of `rows`, which can then be overwritten."""
         if count <= 0:
             return
-        self._look_at(self._block[:count])
+        self._look_at(self.rows[:count])
         others = self.others[:count]
         self.others.clear()
-        self._take(self._block[:count], others)
+        self._take(self.rows[:count], others)
         self.written += count
 
     def _take(self, block: np.ndarray, others: list[list[Value]]) -> None:
@@ -150,7 +146,7 @@ class Recorder(RowBlock):
         self._append(header.getvalue().encode())
 
     def _take(self, block: np.ndarray, others: list[list[Value]]) -> None:
-        whole = len(self._order) == self._block.shape[1]
+        whole = len(self._order) == self.rows.shape[1]
         self._append(rows_text(block) if whole else self._mixed(block.tolist(), others).encode())
 
     def _mixed(self, values: list[list[float]], others: list[list[Value]]) -> str:
@@ -331,7 +327,7 @@ class MemoryRecorder(RowBlock):
         super().__init__(columns, real)
         self.units = dict(units or {})
         self.results: Results | None = None
-        self._columns = Columns(self._order, self._block.shape[1], most)
+        self._columns = Columns(self._order, self.rows.shape[1], most)
 
     def _take(self, block: np.ndarray, others: list[list[Value]]) -> None:
         self._columns.add(block, others)
@@ -368,7 +364,7 @@ class ColumnRecorder(Recorder):
     CHUNK: int | None = None
 
     def _begin(self) -> None:
-        self._columns = Columns(self._order, self._block.shape[1])
+        self._columns = Columns(self._order, self.rows.shape[1])
 
     def _take(self, block: np.ndarray, others: list[list[Value]]) -> None:
         self._columns.add(block, others)
@@ -405,7 +401,7 @@ def write_results(results: Results, folder: Path, *, format: str = "csv") -> Non
     try:
         for first in range(0, len(numbers), BLOCK):
             block = numbers[first : first + BLOCK]
-            recorder.lay(block)
+            recorder.rows = block
             recorder.others += [list(row) for row in others[first : first + len(block)]]
             recorder.write(len(block))
         recorder.finish(results.record.model_copy())

@@ -118,11 +118,7 @@ def names(kind: str) -> list[str]:
 
 def named(name: str | Path, kind: str = "") -> Path | None:
     """Return the file with a name, in the working folder or a folder of scenarios, None if there is none."""
-    bases = [Path(), *folders()]
-    if kind in HOMES:
-        bases += [folder / HOMES[kind] for folder in folders()]
-    candidates = (base / f"{name}{ending}" for base in bases for ending in ENDINGS)
-    return next((path for path in candidates if os.path.isfile(path)), None)
+    return _first(name, kind, [Path(), *folders()])
 
 
 def beside(file: Path, name: str, kind: str) -> Path:
@@ -133,16 +129,17 @@ def beside(file: Path, name: str, kind: str) -> Path:
     path = Path(os.path.normpath(file.parent / name))
     if Path(name).suffix in ENDINGS or os.path.exists(path):
         return path
-    near = (path.with_name(f"{path.name}{ending}") for ending in ENDINGS)
-    if found := next(filter(os.path.isfile, near), None):
-        return found
-    candidates = (
-        folder / home / f"{name}{ending}"
-        for folder in folders()
-        for home in dict.fromkeys((HOMES.get(kind, ""), ""))
-        for ending in ENDINGS
-    )
-    return next((found.absolute() for found in candidates if os.path.isfile(found)), path)
+    if near := _first(path.name, kind, [path.parent]):
+        return near
+    found = _first(name, kind, folders())
+    return found.absolute() if found else path
+
+
+def _first(name: str | Path, kind: str, bases: list[Path]) -> Path | None:
+    """Return the first file with a name in some folders, of each those in its folder for the kind first."""
+    homes = dict.fromkeys((HOMES.get(kind, ""), ""))
+    candidates = (base / home / f"{name}{ending}" for base in bases for home in homes for ending in ENDINGS)
+    return next(filter(os.path.isfile, candidates), None)
 
 
 def placed(folder: Path, name: str, kind: str) -> Path:

@@ -28,6 +28,7 @@ from urllib.parse import unquote, urlsplit
 from lxml import etree
 from lxml.etree import _Element
 
+from yawbench.fmus.description import MODEL_DESCRIPTION
 from yawbench.fmus.fmu import Causality, UnitDefinition, element_names
 from yawbench.fmus.zip_members import DAMAGE, ArchiveError, members, misplaced
 from yawbench.foundation.errors import Diagnostic, Location
@@ -57,6 +58,9 @@ FMU_TYPE = "application/x-fmu-sharedlibrary"
 VALUES_TYPE = "application/x-ssp-parameter-set"
 MAPPING_TYPE = "application/x-ssp-parameter-mapping"
 DICTIONARY_TYPE = "application/x-ssp-signal-dictionary"
+
+TEXTS = ("String", "Enumeration")
+"""Types whose values are texts, of which OMSimulator reads none from an archive."""
 
 OSP_ANNOTATION = "com.opensimulationplatform"
 OMS_ANNOTATION = "org.openmodelica"
@@ -255,7 +259,7 @@ class SspArchive:
                 raise SspError(f"there is no {member} in the archive", component)
             try:
                 with zipfile.ZipFile(io.BytesIO(self._read(member, PACKED))) as fmu:
-                    content = fmu.read(members(fmu)["modelDescription.xml"])
+                    content = fmu.read(members(fmu)[MODEL_DESCRIPTION])
                     description = etree.fromstring(content, _parser())
             except (KeyError, *DAMAGE, etree.XMLSyntaxError):
                 description = etree.Element("none")

@@ -31,6 +31,7 @@ from typing import Any
 from lxml import etree
 from lxml.etree import _Element
 
+from yawbench.fmus.description import INTEGERS
 from yawbench.fmus.fmu import UnitDefinition, Value, integer_limits
 from yawbench.foundation.errors import Diagnostic
 from yawbench.foundation.messages import fold, listed
@@ -47,6 +48,7 @@ from .ssp_archive import (
     SSD,
     SSM,
     SSV,
+    TEXTS,
     VALUES_TYPE,
     ElementPath,
     SspArchive,
@@ -469,22 +471,22 @@ def _transformed(value: SspValue, entry: _Element) -> SspValue:
         value = replace(value, unit=None)
     kind, found = transformation(entry) or ("", entry)
     if kind in TABLES:
-        return replace(value, value=_looked_up(value, found, TABLES[kind]))
+        return replace(value, value=_looked_up(value, found, *TABLES[kind]))
     factor, offset = linear(entry)
     return replace(value, factor=factor, offset=offset)
 
 
 TABLES = {
-    "BooleanMappingTransformation": "Boolean",
-    "IntegerMappingTransformation": "Integer",
-    "EnumerationMappingTransformation": "Enumeration",
+    "BooleanMappingTransformation": ("Boolean", bool),
+    "IntegerMappingTransformation": ("Integer", int),
+    "EnumerationMappingTransformation": ("Enumeration", str),
 }
-"""Transformation that replaces some values by others -> their type."""
+"""Transformation that replaces some values by others -> their type, in SSP and here."""
 
 
-def _looked_up(value: SspValue, table: _Element, kind: str) -> Value:
+def _looked_up(value: SspValue, table: _Element, kind: str, python_type: type) -> Value:
     """Return what a table of values has in place of a value, which is kept if it is not there."""
-    if type(value.value) is not {"Boolean": bool, "Integer": int, "Enumeration": str}[kind]:
+    if type(value.value) is not python_type:
         raise SspError(
             f"{value.name}: a table of values of type {kind} cannot be applied to {value.value}", table
         )
@@ -499,8 +501,6 @@ def _looked_up(value: SspValue, table: _Element, kind: str) -> Value:
 
 
 REALS = ("Real", "Float64", "Float32")
-INTEGERS = ("Integer", *(f"{sign}Int{bits}" for bits in (8, 16, 32, 64) for sign in ("", "U")))
-TEXTS = ("String", "Enumeration")
 BESIDES = ("Dimension", "Annotations", "MetaData", "Signature")
 """Elements of a parameter that are no values."""
 
@@ -517,7 +517,7 @@ def _values(parameter: _Element) -> Array:
         raise SspError(f"{name} has {'more than one' if kinds else 'no'} value", parameter)
     (element,) = kinds
     kind, text = etree.QName(element).localname, element.get("value")
-    if kind not in (*REALS, *INTEGERS, *TEXTS, "Boolean"):
+    if kind not in (*REALS, "Integer", *INTEGERS, *TEXTS, "Boolean"):
         raise unsupported(f"{name} is of type {kind}: not supported", parameter)
     inner = list(element.iterchildren("{*}*"))
     if (text is None) == (not inner):

@@ -132,9 +132,8 @@ class Connector:
             self._report(key, f"connects {target} to itself", "connection-invalid")
             return []
         inputs = self._system.matching_inputs(target, to_pattern)
-        arrays = self._arrays(ends[0], ends[1])
-        if arrays is not None:
-            return self._between_arrays(*arrays, connection, key)
+        if single and (wires := self._between_arrays(single, ends[1], key)) is not None:
+            return wires
         if not inputs:
             self._no_such((*key, "to"), target, to_pattern, "input")
         if ends[0] is None:
@@ -170,25 +169,16 @@ class Connector:
             )
         return [Wire(source, output, target, name) for (source, output), name in pairs]
 
-    def _arrays(
-        self, source: SignalName | list[str] | None, target: SignalName
-    ) -> tuple[list[Variable], list[Variable]] | None:
-        """Return the elements of the ends of a connection, if one of them at least is a whole array."""
-        if not isinstance(source, SignalName) or "*" in source.variable + target.variable:
+    def _between_arrays(self, source: SignalName, target: SignalName, key: KeyPath) -> list[Wire] | None:
+        """Return the wires between two arrays of one size, None if no end is a whole array; report others."""
+        if "*" in source.variable + target.variable:
             return None
         ends = (source, "output", self._outputs), (target, "input", self._inputs)
         scalars = [[v for v in (known[n.instance].get(n.variable),) if v] for n, _, known in ends]
         arrays = [self._fmus[n.instance].elements_of(n.variable, kind) for n, kind, _ in ends]
         outputs, inputs = (array or scalar for array, scalar in zip(arrays, scalars, strict=True))
-        return (outputs, inputs) if any(arrays) and outputs and inputs else None
-
-    def _between_arrays(
-        self, outputs: list[Variable], inputs: list[Variable], connection: Connection, key: KeyPath
-    ) -> list[Wire]:
-        """Return the wires between two arrays of one size; report sizes that differ."""
-        source, target = connection.source, connection.target
-        assert isinstance(source, SignalName)
-        assert isinstance(target, SignalName)
+        if not (any(arrays) and outputs and inputs):
+            return None
         of, to = ([v.name[len(v.array) :] for v in end] for end in (outputs, inputs))
         if of != to:
             has, takes = (end[-1].strip("[]").replace(",", "x") or "one" for end in (of, to))

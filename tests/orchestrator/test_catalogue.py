@@ -80,6 +80,20 @@ def test_a_vehicle_file_goes_by_its_name_with_or_without_its_folder():
     assert van.samefile(SCENARIOS / "vehicles" / "van.yaml")
 
 
+def test_a_scenario_with_the_name_of_a_vehicle_file_is_not_taken_for_it(tmp_path, monkeypatch):
+    own = tmp_path / "scenarios"
+    for file in (own / "van.yaml", own / "vehicles" / "van.yaml"):
+        file.parent.mkdir(exist_ok=True)
+        file.write_text("title: a van\n")
+    for here in (tmp_path, own):
+        monkeypatch.chdir(here)
+        assert catalogue.find("van", "a vehicle file").samefile(own / "vehicles" / "van.yaml")
+        assert catalogue.find("van", "a scenario").samefile(own / "van.yaml")
+        for file in (own / "sine.yaml", own / "deep" / "sine.yaml"):
+            vehicle = catalogue.beside(file, "van", "a vehicle file")
+            assert vehicle.samefile(own / "vehicles" / "van.yaml")
+
+
 @pytest.mark.parametrize(
     ("name", "kind", "likely"),
     [

@@ -65,7 +65,7 @@ def read_dbc(path: Path) -> dict[str, CanSignal]:
 def open_dbc(path: Path) -> Any:
     """Return a DBC file as cantools has it; errors as for `read_dbc`."""
     try:
-        return load_database(path)
+        return load_database(path)[0]
     except ImportError:
         sentence = f"{path}: cantools is not installed: pip install 'yawbench[can]'"
         raise ScenarioError(sentence, code="package-missing") from None

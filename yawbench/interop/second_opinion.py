@@ -308,7 +308,7 @@ def run_own(request: Request) -> Recording:
         master = Master(plan, running, log, StopFlag())
         master.initialize(rows[0], [])
         begin = time.perf_counter()
-        master.advance(request.n_steps, list(rows[1:]), [])
+        master.advance(request.n_steps, rows[1:], [])
         spent = time.perf_counter() - begin
     finally:
         for fmu_instance in running.values():

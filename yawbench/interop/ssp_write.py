@@ -44,6 +44,7 @@ from yawbench.orchestrator.scenario.overrides import with_changes
 from yawbench.orchestrator.scenario.quantities import BASE_UNITS, Unit, conversion, measure_of
 from yawbench.orchestrator.scenario.ssp_archive import (
     DESCRIPTION_FILE,
+    FMU_TYPE,
     NAMESPACES,
     OMS,
     OMS_ANNOTATION,
@@ -56,6 +57,7 @@ from yawbench.orchestrator.scenario.ssp_archive import (
     SSC,
     SSD,
     SSV,
+    TEXTS,
 )
 
 _FILE_TIME = (1980, 1, 1, 0, 0, 0)
@@ -183,7 +185,7 @@ def _lost(plan: Plan) -> list[str]:
         f"{instance.name}.{v.name}"
         for instance in plan.instances
         for v in (*_shown(instance, plan), *(instance.fmu.variables[name] for name in _given(instance)))
-        if v.elements > 1 or (_type(v) not in ("Real", "Integer", *OLD_TYPES, "Boolean", *UNREAD))
+        if v.elements > 1 or (_type(v) not in ("Real", "Integer", *OLD_TYPES, "Boolean", *TEXTS))
     ]
 
 
@@ -201,7 +203,7 @@ def _given(instance: Instance) -> dict[str, Value]:
 
 def _type(variable: Variable) -> str:
     """Return the type of a variable, as SSP 2.0 names it."""
-    plain = variable.fmi_type in ("Boolean", *UNREAD)
+    plain = variable.fmi_type in ("Boolean", *TEXTS)
     return variable.fmi_type if plain or variable.encoding is None else variable.encoding
 
 
@@ -209,8 +211,8 @@ def _array(fmu: Fmu, variable: Variable) -> tuple[str, tuple[int, ...], list[Var
     """Return the name, shape and elements of the array that a variable belongs to; a scalar is its own."""
     if variable.elements == 1:
         return variable.name, (), [variable]
-    name = variable.name.rpartition("[")[0]
-    every = [v for v in fmu.variables.values() if v.name.rpartition("[")[0] == name]
+    name = variable.array
+    every = [v for v in fmu.variables.values() if v.array == name]
     return name, tuple(map(int, every[-1].name[len(name) + 1 : -1].split(","))), every
 
 
@@ -331,9 +333,7 @@ def _add_component(
     enumerations: dict[str, Mapping[str, int]],
     standard: Version,
 ) -> None:
-    component = SubElement(
-        elements, f"{{{SSD}}}Component", name=instance.name, type="application/x-fmu-sharedlibrary"
-    )
+    component = SubElement(elements, f"{{{SSD}}}Component", name=instance.name, type=FMU_TYPE)
     component.set("source", source)
     component.set("implementation", "CoSimulation")
     if instance.fmu.description:
@@ -386,7 +386,7 @@ def _add_values(
         parameter = SubElement(parameters, f"{{{SSV}}}Parameter", name=name)
         kind = SubElement(parameter, f"{{{SSV}}}{_spelled_type(variable, standard)}")
         texts = [_text(v, _value(v, values)) for v in elements]
-        if shape and variable.fmi_type in UNREAD:
+        if shape and variable.fmi_type in TEXTS:
             for text in texts:
                 SubElement(kind, f"{{{SSV}}}Value", value=text)
         else:
@@ -426,7 +426,7 @@ def _spelled_units(plan: Plan) -> dict[str, Unit]:
 def _add_units(above: _Element, spelled: Mapping[str, Unit]) -> None:
     if not spelled:
         return
-    units = SubElement(above, f"{{{SSD if above.tag.startswith('{' + SSD) else SSV}}}Units")
+    units = SubElement(above, f"{{{etree.QName(above).namespace}}}Units")
     for name, measure in spelled.items():
         unit = SubElement(units, f"{{{SSC}}}Unit", name=name)
         base = SubElement(unit, f"{{{SSC}}}BaseUnit")
@@ -485,10 +485,6 @@ def _decimal(seconds: Fraction) -> str:
     return text
 
 
-UNREAD = ("String", "Enumeration")
-"""Types of values that OMSimulator does not read from an archive."""
-
-
 def for_omsimulator(plan: Plan) -> tuple[Plan, list[str]]:
     """Return the plan reduced to what OMSimulator accepts, and a note for every relevant omission.
 
@@ -524,13 +520,13 @@ def for_omsimulator(plan: Plan) -> tuple[Plan, list[str]]:
 def _texts(instance: Instance) -> dict[str, Value]:
     """Return the texts and enumeration items that differ from the FMU's start values."""
     values, variables = {**instance.parameters, **instance.constants}, instance.fmu.variables
-    return {k: v for k, v in values.items() if variables[k].type in UNREAD and v != variables[k].start}
+    return {k: v for k, v in values.items() if variables[k].type in TEXTS and v != variables[k].start}
 
 
 def _without_texts(instance: Instance) -> Instance:
     """Return the instance without values that OMSimulator does not read, and with the step of all."""
     parameters, constants = (
-        {name: value for name, value in values.items() if instance.fmu.variables[name].type not in UNREAD}
+        {name: value for name, value in values.items() if instance.fmu.variables[name].type not in TEXTS}
         for values in (instance.parameters, instance.constants)
     )
     return replace(instance, period=1, parameters=parameters, constants=constants)

@@ -13,6 +13,7 @@ from importlib import import_module
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.lib.stride_tricks import as_strided
 
 from yawbench._controller import PythonComponent
 from yawbench._scenario import Scenario
@@ -104,7 +105,7 @@ class OperatingPoint:
         row = np.empty(1 + len(plan.record))
         with np.errstate(all="ignore"):
             self._master.initialize(row, [])
-            self._master.advance(self._k, [row] * self._k, [])
+            self._master.advance(self._k, as_strided(row, (self._k, row.size), (0, row.itemsize)), [])
         self._operations = [  # a series is held
             [op for op in self._master.program.at(k) if not isinstance(op.call, SeriesFeed)]
             for k in range(self._k + 1, self._k + 1 + cycle)

@@ -202,49 +202,53 @@ def _windows(
         except ValueError as error:
             document.report((name, number), str(error), "segment-unknown")
             continue
-        begin, end = float(stretch.begin), float(stretch.end)
-        first, last = float(segment.time[0]), float(segment.time[-1])
-        if not first - 1e-6 <= begin < end <= last + 1e-6:
-            words = f"{span(begin, end)} s is not within {segment.name}, {span(first, last)} s"
-            document.report((name, number), words, "fit-window")
-            continue
-        longest = float(stretch.window or end - begin)
-        count = max(1, math.ceil((end - begin) / longest - 1e-9))
-        for k in range(count):
-            start = begin + k * longest
-            stop = min(start + longest, end)
-            gaps = by_signals(segment.gaps, segment.signals)
-            if lost := next((lost for lost in gaps if lost[1].overlaps(start, stop)), None):
-                of = f" of {lost[0]}" if lost[0] else ""
-                words = (
-                    f"{segment.name} has no samples{of} from {lost[1]}: leave that out, with two stretches"
-                )
-                document.report((name, number), words, "fit-window")
-                break
-            part = segment.between(start, stop).even()
-            settling = float(spec.settling)
-            if np.count_nonzero(part.time >= part.time[0] + settling - 1e-9) < 3:
-                words = f"a window has less than three samples after 'settling', {settling:g} s"
-                document.report((name, number), words, "fit-window")
-                break
-            label = f"{segment.name}, {span(part.time[0], part.time[-1])} s"
-            measured = {signal: part.signals[signal] for signal in compared}
-            if (angle := next((signal for signal in compared if signal in ANGLES), None)) and (
-                standing(part.signals) is not None
-            ):
-                words = (
-                    f"{label}: there the car is slower than {3.6 * LEAST_SPEED:.0f} km/h, and {angle} means "
-                    "nothing; end the window before, or leave that signal out of 'compared'"
-                )
-                document.report((name, number), words, "fit-window")
-                break
-            if large := [name for name, x in measured.items() if np.abs(x / compared[name]).max() > LARGEST]:
-                words = (
-                    f"{large[0]} reaches more than {LARGEST:g} times the difference expected in 'compared'"
-                )
-                document.report((name, number), f"{words}; check its unit and that", "fit-window")
-                break
-            yield FitWindow(Window(label, part.time, measured), segment, unfiltered)
+        try:
+            for window in _cut(segment, stretch, float(spec.settling), compared):
+                yield FitWindow(window, segment, unfiltered)
+        except ValueError as error:
+            document.report((name, number), str(error), code_of(error, "fit-window"))
+
+
+def _cut(
+    segment: Segment, stretch: StretchSpec, settling: float, compared: Mapping[str, float]
+) -> Iterator[Window]:
+    """Yield the windows of a stretch.
+
+    Raises:
+        ValueError: it is not within the segment, or a window cannot be compared.
+    """
+    begin, end = float(stretch.begin), float(stretch.end)
+    first, last = float(segment.time[0]), float(segment.time[-1])
+    if not first - 1e-6 <= begin < end <= last + 1e-6:
+        raise ValueError(f"{span(begin, end)} s is not within {segment.name}, {span(first, last)} s")
+    longest = float(stretch.window or end - begin)
+    for k in range(max(1, math.ceil((end - begin) / longest - 1e-9))):
+        start = begin + k * longest
+        stop = min(start + longest, end)
+        gaps = by_signals(segment.gaps, segment.signals)
+        if lost := next((lost for lost in gaps if lost[1].overlaps(start, stop)), None):
+            of = f" of {lost[0]}" if lost[0] else ""
+            raise ValueError(
+                f"{segment.name} has no samples{of} from {lost[1]}: leave that out, with two stretches"
+            )
+        part = segment.between(start, stop).even()
+        if np.count_nonzero(part.time >= part.time[0] + settling - 1e-9) < 3:
+            raise ValueError(f"a window has less than three samples after 'settling', {settling:g} s")
+        label = f"{segment.name}, {span(part.time[0], part.time[-1])} s"
+        measured = {signal: part.signals[signal] for signal in compared}
+        if (angle := next((signal for signal in compared if signal in ANGLES), None)) and (
+            standing(part.signals) is not None
+        ):
+            raise ValueError(
+                f"{label}: there the car is slower than {3.6 * LEAST_SPEED:.0f} km/h, and {angle} means "
+                "nothing; end the window before, or leave that signal out of 'compared'"
+            )
+        if large := [name for name, x in measured.items() if np.abs(x / compared[name]).max() > LARGEST]:
+            raise ValueError(
+                f"{large[0]} reaches more than {LARGEST:g} times the difference expected in 'compared'; "
+                "check its unit and that"
+            )
+        yield Window(label, part.time, measured)
 
 
 def _refuse_overlaps(document: Document, spec: FitSpec) -> None:

@@ -22,7 +22,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -358,10 +358,7 @@ def compare_run(results: Results, measurement: Measurement, bands: Bands) -> Val
 def _while_moving(segment: Segment) -> Segment:
     """Return the rows of a segment in which the car moves."""
     stands = standing(segment.signals)
-    if stands is None:
-        return segment
-    signals = {name: values[~stands] for name, values in segment.signals.items()}
-    return replace(segment, time=segment.time[~stands], signals=signals)
+    return segment if stands is None else segment.rows(~stands)
 
 
 def _verdict(over: str, tests: Sequence[ComparedTest]) -> Verdict:

@@ -147,6 +147,11 @@ class Segment:
         """Median sampling rate [Hz]."""
         return 1.0 / float(np.median(np.diff(self.time)))
 
+    def rows(self, which: np.ndarray | slice) -> Segment:
+        """Return the segment with some rows alone: those that an array marks as true, or a slice."""
+        signals = {name: x[which] for name, x in self.signals.items()}
+        return replace(self, time=self.time[which], signals=signals)
+
     def even(self, step: float | None = None) -> Segment:
         """Return the segment sampled evenly, every `step` [s]; default: its median step."""
         grid = even_grid(self.time, step)
@@ -168,29 +173,20 @@ class Segment:
 
     def sampled(self, names: Iterable[str]) -> Segment:
         """Return the rows that lie in no gap of some signals, where their values are not interpolated."""
-        rows = outside((gap for name in names for gap in self.gaps.get(name, ())), self.time)
-        signals = {name: x[rows] for name, x in self.signals.items()}
-        return replace(self, time=self.time[rows], signals=signals)
+        return self.rows(outside((gap for name in names for gap in self.gaps.get(name, ())), self.time))
 
     def parts(self) -> list[Segment]:
         """Return the parts of two samples or more that no gap of any signal interrupts."""
         every = [gap for gaps in self.gaps.values() for gap in gaps]
         return [
-            replace(
-                self,
-                time=self.time[rows],
-                signals={name: x[rows] for name, x in self.signals.items()},
-                gaps={},
-            )
+            replace(self.rows(rows), gaps={})
             for rows in (parts_between(every, self.time) if every else [slice(None)])
             if self.time[rows].size > 1
         ]
 
     def between(self, begin: float, end: float) -> Segment:
         """Return the part from `begin` to `end` [s], both included."""
-        inside = (self.time >= begin - 1e-9) & (self.time <= end + 1e-9)
-        signals = {name: x[inside] for name, x in self.signals.items()}
-        return replace(self, time=self.time[inside], signals=signals)
+        return self.rows((self.time >= begin - 1e-9) & (self.time <= end + 1e-9))
 
 
 def parts_of(times: np.ndarray, labels: np.ndarray | None, *, least: int = 2) -> Iterator[tuple[str, slice]]:
