@@ -227,15 +227,16 @@ def test_a_scheduler_without_workers_is_one_sentence(moods, yawbench, tmp_path):
 
 
 def test_workers_of_another_version_are_refused(moods, yawbench, cluster_of_threads, monkeypatch):  # noqa: F811
-    from yawbench.cluster import cluster as module
+    from distributed import Client
 
-    theirs = module.versions()
-    ours = {**theirs, "yawbench": "99.0"}
-    monkeypatch.setattr(module, "ours", lambda: ours)
+    from yawbench.cluster.cluster import versions
+
+    there = {**versions(), "yawbench": "99.0"}
+    monkeypatch.setattr(Client, "run", lambda client, function, **options: {"tcp://other": there})
     status, _, err = yawbench(moods(10), "out", "--scheduler", cluster_of_threads.scheduler_address)
     assert status == 2
-    assert f"yawbench {theirs['yawbench']}" in err.splitlines()[-1]
-    assert "99.0" in err.splitlines()[-1]
+    assert f"{versions()['yawbench']} here" in err.splitlines()[-1]
+    assert "99.0 there" in err.splitlines()[-1]
     assert mentions(err.splitlines()[-1], "fit", "yawbench")
 
 

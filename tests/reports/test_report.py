@@ -346,17 +346,19 @@ def test_studies_that_would_share_a_results_folder_are_refused(report, half):
     )
 
 
-def test_the_four_papers_are_found_in_their_order_and_what_goes_beyond_them_after():
-    found = [path.relative_to(ROOT / "scenarios").as_posix() for path in found_studies(ROOT / "scenarios")]
+def test_the_four_papers_are_found_in_their_order_and_what_goes_beyond_them_after(monkeypatch):
+    monkeypatch.chdir(ROOT)
+    found = [path.relative_to("scenarios").as_posix() for path in found_studies()]
     papers = ("fnn_sideslip/study", "fnn_sideslip/laws", "fuzzy_sliding_mode/study",
               "fuzzy_sliding_mode/distribution", "fuzzy_pid/study", "fuzzy_feedback/study")  # fmt: skip
     assert found[:6] == [f"{name}.yaml" for name in papers]
     assert {"real_signals/latency.yaml", "lqg/study.yaml", "proving_ground/esc.yaml"} <= {*found[6:]}
 
 
-def test_without_any_study_it_says_where_it_looked(tmp_path):
+def test_without_any_study_it_says_where_it_looked(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     with refused(ScenarioError, "file-wrong-kind", names=("*", "study", "file")):
-        found_studies(tmp_path)
+        found_studies()
 
 
 def test_two_wishes_that_exclude_each_other_are_refused(report, half):

@@ -271,7 +271,7 @@ def _check_workers(client: Any, address: str) -> int:
         raise ScenarioError(
             f"--scheduler {address}: this scheduler has no workers", code="cluster-unavailable"
         )
-    here = ours()
+    here = versions()
     for worker, theirs in client.run(versions, on_error="return").items():
         if isinstance(theirs, OSError):  # it has gone or is restarting; runs go to the others
             continue
@@ -300,7 +300,3 @@ def versions() -> dict[str, str]:
         "orchestrator": f"sources {sources_hash(OF_METRICS)}",
         "pythonfmu": version("pythonfmu"),
     }
-
-
-ours = versions
-"""The versions here, which those of the workers must match."""

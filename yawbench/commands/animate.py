@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -24,6 +24,9 @@ from yawbench.commands.recorded_runs import (
 from yawbench.commands.terminal_progress import say
 from yawbench.foundation.errors import ResultsError, ScenarioError
 from yawbench.foundation.messages import hint, listed
+
+if TYPE_CHECKING:
+    from yawbench.figures.display import LabelledRun
 
 Page = Annotated[
     Path | None, typer.Option("--out", metavar="FILE", help="Page (.html), or video: .gif, .webp, .png.")
@@ -71,41 +74,34 @@ def animate(
         )
     start = start_of(begin)
     folders = with_segments(recorded(sources, options), measured)
-    labels = labels_of(folders, label)
+    runs = labelled(labels_of(folders, label), folders, start)
     if not moving or out is None:
-        write_view(folders, labels, (), out, start)
+        write_view(runs, (), out, folder_of_all(folders))
         return
     from yawbench.reports.video import write_video
 
-    text = page_of(folders, labels, (), start)
+    text = page_of(runs, ())
     count = write_video(text, out, camera=camera or "chase", speed=speed or 1.0)
     say(f"{out}: {count} frames, {out.stat().st_size / 1000:.0f} kB")
 
 
-def write_view(
-    folders: Sequence[Path],
-    labels: Sequence[str],
-    panels: Sequence[str],
-    out: Path | None,
-    start: float = 0.0,
-) -> None:
+def write_view(runs: Sequence[LabelledRun], panels: Sequence[str], out: Path | None, folder: Path) -> None:
     """Write the page of a viewer.
 
     Args:
-        folders: of the runs.
-        labels: of the runs.
+        runs: shown, with their labels.
         panels: signals shown at first; none: those that the papers draw.
-        out: the page; default: view.html in the folder of the run, or in that of all runs.
-        start: time of measurements [s] at which the runs begin.
+        out: the page; default: view.html in `folder`.
+        folder: of the runs.
 
     Raises:
-        ResultsError: a run cannot be read, or the page cannot be written.
+        ResultsError: the page cannot be written.
         ScenarioError: no run has recorded a panel.
     """
     from yawbench.foundation.safe_files import write_whole
 
-    text = page_of(folders, labels, panels, start)
-    file = out or folder_of_all(folders) / "view.html"
+    text = page_of(runs, panels)
+    file = out or folder / "view.html"
     try:
         write_whole(file, text, named=out is not None)
     except OSError as error:
@@ -115,11 +111,10 @@ def write_view(
     say(f"{file}: {len(text.encode()) / 1000:.0f} kB")
 
 
-def page_of(folders: Sequence[Path], labels: Sequence[str], panels: Sequence[str], start: float) -> str:
+def page_of(runs: Sequence[LabelledRun], panels: Sequence[str]) -> str:
     """Return the page of a viewer; for arguments and errors see `write_view`."""
     from yawbench.reports.viewer import Settings, check_panels, page
     from yawbench.reports.viewer_views import views_of
 
-    runs = labelled(labels, folders, start)
     check_panels(runs, panels)
     return page(runs, Settings([*views_of(panels)]))

@@ -199,13 +199,13 @@ def plot(
     file = options.out if options.out and options.out.suffix[1:] in KINDS and not page else None
     start = start_of(begin)
     folders = with_segments(recorded(sources, options), measured)
-    labels = labels_of(folders, label)
+    labels, thin = labels_of(folders, label), not page and minus is None and window is None
+    runs = labelled(labels, folders, start, thin=thin)
     if page:
         out = options.out
         page_file = out if out is None or out.suffix == ".html" else out / "view.html"
-        write_view(folders, labels, panel or (), page_file, start)
+        write_view(runs, panel or (), page_file, folder_of_all(folders))
         return
-    runs = labelled(labels, folders, start, thin=minus is None and window is None)
     if minus is not None:
         runs = differences(runs, runs[_place(minus, labels, folders)])
         if "path" in (panel or ()):

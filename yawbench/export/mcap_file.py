@@ -26,27 +26,9 @@ from yawbench.reports.viewer_views import PANELS
 from yawbench.scene.scene import FRAMES, Scene, quaternions, samples
 from yawbench.vocabulary.wheels import WHEELS
 
+from . import shapes
 from .formats import ExportedRun
-from .shapes import (
-    ASPHALT,
-    CONE,
-    CONE_SIZE,
-    LANE,
-    PER_NEWTON,
-    SIDEWAYS,
-    TYRE,
-    TYRE_WIDTH,
-    Arrows,
-    Colour,
-    arc_of,
-    arrows_of,
-    boxes_of,
-    colour_of,
-    frames_of,
-    ground_colour,
-    strip_of,
-    triangles,
-)
+from .shapes import Arrows, Box, Colour
 
 WORLD = "road"
 GHOST = 0.4
@@ -78,7 +60,7 @@ def write(runs: Sequence[ExportedRun], file: Path) -> list[Path]:
         _road(still, [scene for _, _, scene in scenes])
         begin = min(_nanoseconds(float(scene.time[0])) for _, _, scene in scenes)
         for number, label, scene in scenes:
-            colour = colour_of(number)
+            colour = shapes.colour_of(number)
             _car(still, label, scene, colour, GHOST if number else 1.0)
             for time, frames, moving in _moving(label, scene, colour):
                 messages += [(time, to_tf, frames), (time, to_scene, moving)]
@@ -198,13 +180,11 @@ def _line(entity: Any, points: np.ndarray, rgb: Sequence[float], thick: float, a
         _point(line.points.add(), point)
 
 
-def _box(
-    entity: Any, centre: Sequence[float], size: Sequence[float], rgb: Colour, alpha: float = 1.0
-) -> None:
+def _box(entity: Any, box: Box, rgb: Colour, alpha: float = 1.0) -> None:
     cube = entity.cubes.add()
-    _point(cube.pose.position, centre)
+    _point(cube.pose.position, box.centre)
     _turn(cube.pose.orientation, (0, 0, 0, 1))
-    _point(cube.size, size)
+    _point(cube.size, box.size)
     _paint(cube.color, rgb, alpha)
 
 
@@ -215,38 +195,37 @@ def _road(update: Any, scenes: Sequence[Scene]) -> None:
     for level, piece in enumerate(places.ground):
         mesh = entity.triangles.add()
         _turn(mesh.pose.orientation, (0, 0, 0, 1))
-        _paint(mesh.color, ground_colour(piece.friction))
-        for point in triangles(piece.corners, 0.001 * level - 0.05):
+        _paint(mesh.color, shapes.ground_colour(piece.friction))
+        for point in shapes.triangles(piece.corners, 0.001 * level - 0.05):
             _point(mesh.points.add(), point)
     for lane in places.lanes:
-        centre = 0.5 * (lane.start + lane.end), lane.middle, -0.01
-        _box(entity, centre, (lane.end - lane.start, lane.left - lane.right, 0.02), LANE)
+        _box(entity, shapes.box_of(lane), shapes.LANE)
     for x, y in places.cones:
         cone = entity.cylinders.add(bottom_scale=1.0, top_scale=0.1)
-        _point(cone.pose.position, (x, y, 0.5 * CONE_SIZE[1]))
+        _point(cone.pose.position, (x, y, 0.5 * shapes.CONE_SIZE[1]))
         _turn(cone.pose.orientation, (0, 0, 0, 1))
-        _point(cone.size, (2 * CONE_SIZE[0], 2 * CONE_SIZE[0], CONE_SIZE[1]))
-        _paint(cone.color, CONE)
+        _point(cone.size, (2 * shapes.CONE_SIZE[0], 2 * shapes.CONE_SIZE[0], shapes.CONE_SIZE[1]))
+        _paint(cone.color, shapes.CONE)
     for scene in scenes:
         if scene.path is not None:
-            _line(entity, strip_of(scene, scene.path, 0.02), (0.5, 0.5, 0.5), 0.05)
+            _line(entity, shapes.strip_of(scene, scene.path, 0.02), (0.5, 0.5, 0.5), 0.05)
 
 
 def _car(update: Any, label: str, scene: Scene, colour: Colour, alpha: float) -> None:
     """Add the body, the wheels and the path of a car."""
     body = update.entities.add(id=f"{label} body", frame_id=f"{label}/body", frame_locked=True)
-    for box in boxes_of(scene.car):
-        _box(body, box.centre, box.size, colour, alpha)
+    for box in shapes.boxes_of(scene.car):
+        _box(body, box, colour, alpha)
     for wheel in WHEELS:
         entity = update.entities.add(
             id=f"{label} {wheel}", frame_id=f"{label}/wheel_{wheel}", frame_locked=True
         )
         tyre = entity.cylinders.add(bottom_scale=1.0, top_scale=1.0)
-        _turn(tyre.pose.orientation, SIDEWAYS)
-        _point(tyre.size, (2 * scene.car.radius, 2 * scene.car.radius, TYRE_WIDTH))
-        _paint(tyre.color, TYRE, alpha)
+        _turn(tyre.pose.orientation, shapes.SIDEWAYS)
+        _point(tyre.size, (2 * scene.car.radius, 2 * scene.car.radius, shapes.TYRE_WIDTH))
+        _paint(tyre.color, shapes.TYRE, alpha)
     entity = update.entities.add(id=f"{label} path", frame_id=WORLD, frame_locked=True)
-    _line(entity, strip_of(scene, scene.position, 0.03), colour, 0.08)
+    _line(entity, shapes.strip_of(scene, scene.position, 0.03), colour, 0.08)
 
 
 def _moving(label: str, scene: Scene, colour: Colour) -> Iterator[tuple[int, bytes, bytes]]:
@@ -255,7 +234,7 @@ def _moving(label: str, scene: Scene, colour: Colour) -> Iterator[tuple[int, byt
     from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 
     rows = samples(scene.time, FRAMES)
-    frames, arrows = [*frames_of(label, scene, rows, WORLD)], [*arrows_of(scene, rows, colour)]
+    frames, arrows = [*shapes.frames_of(label, scene, rows, WORLD)], [*shapes.arrows_of(scene, rows, colour)]
     for k, row in enumerate(rows):
         time = float(scene.time[row])
         transforms, update = FrameTransforms(), SceneUpdate()
@@ -269,11 +248,11 @@ def _moving(label: str, scene: Scene, colour: Colour) -> Iterator[tuple[int, byt
         for kind in arrows:
             _arrows(entity, kind, k)
         if moment := float(scene.yaw_moment[row]):
-            _line(entity, arc_of(moment, scene.car.height + 0.1), (0.35, 0.35, 0.35), 0.1)
+            _line(entity, shapes.arc_of(moment, scene.car.height + 0.1), (0.35, 0.35, 0.35), 0.1)
         for contact, grip in zip(scene.contacts[row], scene.grip[row], strict=True):
             if grip > 0:
                 angle = np.linspace(0.0, 2 * np.pi, 33)
-                round_ = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle]) * grip * PER_NEWTON
+                round_ = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle]) * grip * shapes.PER_NEWTON
                 _line(entity, round_ + contact + np.array([0.0, 0.0, 0.02]), colour, 0.02)
         yield _nanoseconds(time), transforms.SerializeToString(), update.SerializeToString()
 
@@ -306,7 +285,7 @@ def _layout(runs: Sequence[ExportedRun], scene: bool) -> dict[str, Any]:
                 "value": _message_path(run.label, column),
                 "label": run.label,
                 "enabled": True,
-                "color": to_hex(colour_of(number)),
+                "color": to_hex(shapes.colour_of(number)),
                 "timestampMethod": "receiveTime",
             }
             for number, run in enumerate(runs)
@@ -331,7 +310,7 @@ def _layout(runs: Sequence[ExportedRun], scene: bool) -> dict[str, Any]:
         "followMode": "follow-pose",
         "followTf": first,
         "cameraState": {"distance": 12, "phi": 60, "thetaOffset": 90, "perspective": True, "fovy": 45},
-        "scene": {"backgroundColor": to_hex(ASPHALT)},
+        "scene": {"backgroundColor": to_hex(shapes.ASPHALT)},
         "topics": {"/scene": {"visible": True}},
         "layers": {"grid": {"layerId": "foxglove.Grid", "frameId": WORLD, "size": 200, "divisions": 20}},
     }

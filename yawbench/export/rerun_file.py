@@ -28,26 +28,9 @@ from yawbench.reports.viewer_views import PANELS
 from yawbench.scene.scene import FRAMES, Scene, samples
 from yawbench.vocabulary.wheels import WHEELS
 
+from . import shapes
 from .formats import ExportedRun
-from .shapes import (
-    ASPHALT,
-    CONE,
-    CONE_SIZE,
-    LANE,
-    PER_NEWTON,
-    SIDEWAYS,
-    TYRE,
-    TYRE_WIDTH,
-    Colour,
-    arc_of,
-    arrows_of,
-    boxes_of,
-    colour_of,
-    frames_of,
-    ground_colour,
-    strip_of,
-    triangles,
-)
+from .shapes import Box, Colour
 
 GHOST = 110
 """Opacity of the runs after the first, of 255."""
@@ -74,9 +57,9 @@ def _record(runs: Sequence[ExportedRun], file: Path) -> None:
         recording.log("/", rr.ViewCoordinates.FLU, static=True)
         _road(recording, [scene for _, _, scene in scenes])
     for number, label, scene in scenes:
-        _car(recording, f"cars/{_part(label)}", scene, colour_of(number), GHOST if number else 255)
+        _car(recording, f"cars/{_part(label)}", scene, shapes.colour_of(number), GHOST if number else 255)
     for number, run in enumerate(runs):
-        _signals(recording, run, colour_of(number))
+        _signals(recording, run, shapes.colour_of(number))
         for event in run.events:
             recording.set_time(TIME, duration=event.time)
             recording.log(f"events/{_part(run.label)}", rr.TextLog(sentence(event), level="WARN"))
@@ -102,38 +85,42 @@ def _times(time: np.ndarray) -> list[Any]:
     return [rr.TimeColumn(TIME, duration=time)]
 
 
+def _boxes(boxes: Sequence[Box], colour: tuple[int, ...]) -> Any:
+    import rerun as rr
+
+    return rr.Boxes3D(
+        centers=[box.centre for box in boxes],
+        half_sizes=[[0.5 * side for side in box.size] for box in boxes],
+        colors=[colour],
+        fill_mode="solid",
+    )
+
+
 def _road(recording: Any, scenes: Sequence[Scene]) -> None:
     import rerun as rr
 
     places = scenes[0].places
     for level, piece in enumerate(places.ground):
         mesh = rr.Mesh3D(
-            vertex_positions=triangles(piece.corners, 0.001 * level - 0.05),
-            albedo_factor=_rgb(ground_colour(piece.friction)),
+            vertex_positions=shapes.triangles(piece.corners, 0.001 * level - 0.05),
+            albedo_factor=_rgb(shapes.ground_colour(piece.friction)),
         )
         recording.log(f"road/ground/{level}_friction_{piece.friction:g}", mesh, static=True)
     if places.lanes:
-        lanes = rr.Boxes3D(
-            centers=[(0.5 * (lane.start + lane.end), lane.middle, -0.01) for lane in places.lanes],
-            half_sizes=[
-                (0.5 * (lane.end - lane.start), 0.5 * (lane.left - lane.right), 0.01) for lane in places.lanes
-            ],
-            colors=[_rgb(LANE)],
-            fill_mode="solid",
-        )
+        lanes = _boxes([*map(shapes.box_of, places.lanes)], _rgb(shapes.LANE))
         recording.log("road/lanes", lanes, static=True)
-        radius, height = CONE_SIZE
+        radius, height = shapes.CONE_SIZE
         cones = rr.Cylinders3D(
             centers=[(x, y, 0.5 * height) for x, y in places.cones],
             lengths=[height] * len(places.cones),
             radii=[0.6 * radius] * len(places.cones),
-            colors=[_rgb(CONE)],
+            colors=[_rgb(shapes.CONE)],
             fill_mode="solid",
         )
         recording.log("road/cones", cones, static=True)
     for number, scene in enumerate(scenes):
         if scene.path is not None:
-            strip = strip_of(scene, scene.path, 0.02)
+            strip = shapes.strip_of(scene, scene.path, 0.02)
             line = rr.LineStrips3D([strip], colors=[(128, 128, 128)], radii=[0.03])
             recording.log(f"road/plan/{number}", line, static=True)
 
@@ -147,27 +134,20 @@ def _car(recording: Any, base: str, scene: Scene, colour: Colour, alpha: int) ->
     def moving(path: str, columns: Any) -> None:
         recording.send_columns(path, at, columns)
 
-    for frame in frames_of(label, scene, rows, ""):
+    for frame in shapes.frames_of(label, scene, rows, ""):
         columns = rr.Transform3D.columns(translation=frame.place, quaternion=frame.turn)
         moving(f"cars/{frame.name}", columns)
-    boxes = boxes_of(scene.car)
-    body = rr.Boxes3D(
-        centers=[box.centre for box in boxes],
-        half_sizes=[[0.5 * side for side in box.size] for box in boxes],
-        colors=[_rgb(colour, alpha)],
-        fill_mode="solid",
-    )
-    recording.log(f"{base}/body", body, static=True)
+    recording.log(f"{base}/body", _boxes(shapes.boxes_of(scene.car), _rgb(colour, alpha)), static=True)
     for wheel in WHEELS:
         tyre = rr.Cylinders3D(
-            lengths=[TYRE_WIDTH],
+            lengths=[shapes.TYRE_WIDTH],
             radii=[scene.car.radius],
-            quaternions=[rr.Quaternion(xyzw=SIDEWAYS)],
-            colors=[_rgb(TYRE, alpha)],
+            quaternions=[rr.Quaternion(xyzw=shapes.SIDEWAYS)],
+            colors=[_rgb(shapes.TYRE, alpha)],
             fill_mode="solid",
         )
         recording.log(f"{base}/wheel_{wheel}/tyre", tyre, static=True)
-    for kind in arrows_of(scene, rows, colour):
+    for kind in shapes.arrows_of(scene, rows, colour):
         count = kind.origins.shape[1]
         tints = (255 * kind.colours).round().astype(np.uint32).reshape(-1, 3)
         packed = tints[:, 0] << 24 | tints[:, 1] << 16 | tints[:, 2] << 8 | 255
@@ -179,7 +159,7 @@ def _car(recording: Any, base: str, scene: Scene, colour: Colour, alpha: int) ->
         recording.log(f"{base}/{kind.kind}", thick, static=True)
     if np.isfinite(scene.grip).all():
         columns = rr.Cylinders3D.columns(
-            radii=(scene.grip[rows] * PER_NEWTON).reshape(-1),
+            radii=(scene.grip[rows] * shapes.PER_NEWTON).reshape(-1),
             lengths=np.full(4 * len(rows), 0.01),
             centers=scene.contacts[rows].reshape(-1, 3),
         )
@@ -187,11 +167,11 @@ def _car(recording: Any, base: str, scene: Scene, colour: Colour, alpha: int) ->
         looks = rr.Cylinders3D.from_fields(colors=[_rgb(colour, 60)], fill_mode="solid")
         recording.log(f"{base}/grip", looks, static=True)
     if scene.yaw_moment.any():
-        arcs = [arc_of(float(scene.yaw_moment[row]), scene.car.height + 0.1) for row in rows]
+        arcs = [shapes.arc_of(float(scene.yaw_moment[row]), scene.car.height + 0.1) for row in rows]
         moving(f"{base}/yaw_moment", rr.LineStrips3D.columns(strips=arcs))
         grey = rr.LineStrips3D.from_fields(colors=[(90, 90, 90)], radii=[0.05])
         recording.log(f"{base}/yaw_moment", grey, static=True)
-    strip = strip_of(scene, scene.position, 0.03)
+    strip = shapes.strip_of(scene, scene.position, 0.03)
     line = rr.LineStrips3D([strip], colors=[_rgb(colour)], radii=[0.04])
     recording.log(f"road/path/{label}", line, static=True)
 
@@ -249,7 +229,7 @@ def _layout(runs: Sequence[ExportedRun], first: str | None) -> Any:
             contents=["cars/**", "road/**"],
             name="cars",
             eye_controls=follow,
-            background=_rgb(ASPHALT)[:3],
+            background=_rgb(shapes.ASPHALT)[:3],
         )
         columns.insert(0, rrb.Vertical(space, told, row_shares=[3, 1]))
     else:

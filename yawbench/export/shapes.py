@@ -11,6 +11,7 @@ from matplotlib.colors import to_rgb
 from yawbench.figures.style import line_style
 from yawbench.scene.outline import CarOutline
 from yawbench.scene.scene import FRAMES, Scene, quaternions, samples
+from yawbench.vocabulary.lane_change import Lane
 from yawbench.vocabulary.wheels import WHEELS
 
 Colour = tuple[float, float, float]
@@ -73,6 +74,12 @@ def boxes_of(car: CarOutline) -> list[Box]:
         Box((middle, 0.0, 0.5 * (low + belt)), (long, car.width, belt - low)),
         Box((middle - 0.06 * long, 0.0, belt + 0.5 * cabin), (0.5 * long, 0.82 * car.width, cabin)),
     ]
+
+
+def box_of(lane: Lane) -> Box:
+    """Return a lane as a thin box below the road."""
+    centre = 0.5 * (lane.start + lane.end), lane.middle, -0.01
+    return Box(centre, (lane.end - lane.start, lane.left - lane.right, 0.02))
 
 
 class Frame(NamedTuple):

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from yawbench.commands import json_and_latex
-from yawbench.commands.experiments import command_of, print_forecasts
+from yawbench.commands.experiments import command_of, print_forecasts, say_page
 from yawbench.commands.json_and_latex import tabular
 from yawbench.commands.options import MAKING, RunOptions, executor_of, named, pooled, takes
 from yawbench.commands.output import print_tables
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
     from .ranking import EntrySpec
     from .ranking_scores import EntryScore
+    from .threats import LoadedThreats
     from .whole_ranking import WholeRanking
 
 RankingFile = Annotated[
@@ -89,13 +90,14 @@ def rank(
     from .ranking import load_ranking
     from .ranking_page import beside_matrix
     from .ranking_tables import columns_of_entries, lost_cells, table_of
+    from .threats import load_threats
     from .whole_ranking import run_whole
 
     more = dict(map(_entry, controller or ()))
+    command = command_of("rank", file, quick=quick, controller=controller, condition=condition)
     if "threats" in (yaml_lines.read(file, what="ranking file").data or {}):
-        _rank_by_threats(
-            context, options, file, more, only or (), condition or (), quick=quick, controller=controller
-        )
+        threats = load_threats(file, more=more, quick=quick)
+        _rank_by_threats(context, options, threats, only or (), condition or (), command)
         return
     ranking = load_ranking(file, more=more, quick=quick, chosen=condition or ())
     _check("--only", "entry", only or (), ranking.entries)
@@ -109,7 +111,6 @@ def rank(
     hold(context, folder)
     with stoppable(folder), executor_of(folder, ranking.identity, options, format="parquet") as execute:
         ranked = run_whole(ranking, execute, only=only or ())
-        command = command_of("rank", file, quick=quick, controller=controller, condition=condition)
         _write(ranked, folder, command, pooled(context, options))
     json_and_latex.answer(folder=folder, page=folder / PAGE, entries=records_in(columns_of_entries(ranked)))
     _pass_on(score for score in ranked.scores if not only or score.entry in only)
@@ -151,13 +152,10 @@ def _check(option: str, what: str, names: Sequence[str], known: Mapping[str, Any
 def _rank_by_threats(
     context: typer.Context,
     options: RunOptions,
-    file: Path,
-    more: Mapping[str, EntrySpec],
+    threats: LoadedThreats,
     only: Sequence[str],
     chosen: Sequence[str],
-    *,
-    quick: bool,
-    controller: list[str] | None,
+    command: str,
 ) -> None:
     """Search the levels that entries survive; write tables and page."""
     from yawbench.foundation.safe_files import write_whole
@@ -168,13 +166,11 @@ def _rank_by_threats(
     from .threat_runs import run_threats, table_of_levels, table_of_quantities
     from .threat_scores import scored, table_of_scores
     from .threat_tables import main_table
-    from .threats import load_threats
     from .threats_page import threats_page
 
-    threats = load_threats(file, more=more, quick=quick)
     _check("--only", "entry", only, threats.ranking.entries)
     _check("--condition", "condition", chosen, {**threats.spec.settings, **threats.spec.disciplines})
-    folder = options.out or default_folder(file)
+    folder = options.out or default_folder(threats.path)
     if options.dry_run:
         from .dry_run import of_threats
 
@@ -189,9 +185,8 @@ def _rank_by_threats(
     table = scored(result)
     write_whole(folder / "scores.csv", to_csv(table_of_scores(table)))
     page = folder / PAGE
-    command = command_of("rank", file, quick=quick, controller=controller, condition=[*chosen])
     write_whole(page, threats_page(result, table, folder, command))
-    say(f"The page: {page} ({page.stat().st_size / 1e6:.1f} MB)")
+    say_page(page)
     json_and_latex.answer(folder=folder, page=page, entries=records_in(table_of_scores(table)))
     print_tables([main_table(result, table)])
 
@@ -250,4 +245,4 @@ def _write(ranked: WholeRanking, folder: Path, command: str, each: Each) -> None
         say(f"{FIGURES}/pareto: {error}")
     page = folder / PAGE
     write_whole(page, ranking_page(ranked, folder, command, each))
-    say(f"The page: {page} ({page.stat().st_size / 1e6:.1f} MB)")
+    say_page(page)

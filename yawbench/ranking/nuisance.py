@@ -30,7 +30,7 @@ from yawbench.studies.executor import Executor
 from yawbench.studies.experiment import LoadedExperiment, NamedRun, experiment_of
 from yawbench.studies.jobs import MeasuredRun
 from yawbench.studies.pair_comparisons import ToldApart, told_apart
-from yawbench.studies.tables import Cell, Table, column
+from yawbench.studies.tables import Cell, Table, number_column, text_column
 
 from .ranked_runs import axes_of_repeats, determine_angles, repeats_of
 from .ranking import RECORDED, EntrySpec, LoadedRanking, OrdinarySpec
@@ -274,14 +274,10 @@ def nuisance_table(nuisance: Nuisance) -> Table:
 def columns_of_nuisance(nuisance: Nuisance) -> Table:
     """Return columns with a row per run, in SI units."""
     runs = [run for score in nuisance.scores.values() for run in score.runs]
-    texts = (
-        column(name, "string", [None if (x := getattr(run, name)) is None else str(x) for run in runs])
-        for name in ("entry", "situation", "car", "repeat")
-    )
+    names = ("entry", "situation", "car", "repeat")
+    texts = (text_column(name, [getattr(run, name) for run in runs]) for name in names)
     units = {"braking": "1", "pressure": "Pa", "speed_end": "m/s"}
-    numbers = (
-        column(key, "float64", [run[key] for run in runs], {"unit": unit}) for key, unit in units.items()
-    )
+    numbers = (number_column(key, unit, [run[key] for run in runs]) for key, unit in units.items())
     return Table.of_columns([*texts, *numbers])
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,7 +16,7 @@ from yawbench.orchestrator.results.run_record import RUN_FILE
 from yawbench.proving_ground.sine_with_dwell import percent
 from yawbench.studies.jobs import STEP_TIME
 from yawbench.studies.run_remarks import lost_notes
-from yawbench.studies.tables import Cell, Column, Table, column
+from yawbench.studies.tables import Cell, Table, count_column, number_column, text_column
 
 from .ranking_scores import (
     Digits,
@@ -236,38 +236,26 @@ def _ratio(ratio: float | None) -> Cell:
     return None if ratio is None else percent(ratio)
 
 
-def _text(name: str, values: Iterable[object]) -> tuple[Column, Sequence[Cell]]:
-    return column(name, "string", [None if value is None else str(value) for value in values])
-
-
-def _counts(name: str, values: Iterable[int | None]) -> tuple[Column, Sequence[Cell]]:
-    return column(name, "int64", list(values))
-
-
-def _numbers(name: str, unit: str, values: Iterable[float | None]) -> tuple[Column, Sequence[Cell]]:
-    return column(name, "float64", list(values), {"unit": unit})
-
-
 def columns_of_entries(ranked: RankingResult) -> Table:
     """Return columns with a row per controller, in SI units."""
     rows = ranked.scores
     return Table.of_columns(
         [
-            _text("entry", (score.entry for score in rows)),
-            _text("title", (score.spec.title for score in rows)),
-            _text("gains", (score.spec.gains for score in rows)),
-            _counts("place", (score.place for score in rows)),
-            _counts("rank", (score.rank for score in rows)),
-            _counts("conditions", (len(score.cells) for score in rows)),
-            _counts("passed", (score.count(RankedState.PASSED) for score in rows)),
-            _numbers("passed_low", "1", (score.bounds and score.bounds.low for score in rows)),
-            _numbers("passed_high", "1", (score.bounds and score.bounds.high for score in rows)),
-            _numbers("braking", "1", (score.braking for score in rows)),
-            _counts("spun", (score.count(RankedState.SPUN) for score in rows)),
-            _counts("missing", (score.missing for score in rows)),
-            _numbers("share", "1", (None if score.missing else score.share for score in rows)),
-            *(_numbers(key, unit, [score.mean(key) for score in rows]) for key, unit in UNITS.items()),
-            _numbers("step_time", "s", (score.step_time for score in rows)),
+            text_column("entry", (score.entry for score in rows)),
+            text_column("title", (score.spec.title for score in rows)),
+            text_column("gains", (score.spec.gains for score in rows)),
+            count_column("place", (score.place for score in rows)),
+            count_column("rank", (score.rank for score in rows)),
+            count_column("conditions", (len(score.cells) for score in rows)),
+            count_column("passed", (score.count(RankedState.PASSED) for score in rows)),
+            number_column("passed_low", "1", (score.bounds and score.bounds.low for score in rows)),
+            number_column("passed_high", "1", (score.bounds and score.bounds.high for score in rows)),
+            number_column("braking", "1", (score.braking for score in rows)),
+            count_column("spun", (score.count(RankedState.SPUN) for score in rows)),
+            count_column("missing", (score.missing for score in rows)),
+            number_column("share", "1", (None if score.missing else score.share for score in rows)),
+            *(number_column(key, unit, [score.mean(key) for score in rows]) for key, unit in UNITS.items()),
+            number_column("step_time", "s", (score.step_time for score in rows)),
         ]
     )
 
@@ -277,22 +265,22 @@ def columns_of_cells(ranked: RankingResult) -> Table:
     cells = [cell for score in ranked.scores for cell in score.cells.values()]
     numbers = []
     for key, unit in {**UNITS, STEP_TIME: "s"}.items():
-        numbers.append(_numbers(key, unit, [None if cell.missing else cell.number(key) for cell in cells]))
+        own = (None if cell.missing else cell.number(key) for cell in cells)
+        numbers.append(number_column(key, unit, own))
         if key in ("headroom", "sideslip"):
-            over = [getattr(cell, key) for cell in cells]
-            numbers.append(
-                _numbers(f"{key}_half_width", unit, [confidence and confidence.half for confidence in over])
-            )
+            over = (getattr(cell, key) for cell in cells)
+            halves = (confidence and confidence.half for confidence in over)
+            numbers.append(number_column(f"{key}_half_width", unit, halves))
         if key == "sideslip":
             least = (None if cell.missing else cell.displacement for cell in cells)
-            numbers.append(_numbers("displacement", "m", least))
+            numbers.append(number_column("displacement", "m", least))
     return Table.of_columns(
         [
-            _text("entry", (cell.entry for cell in cells)),
-            _text("condition", (cell.condition for cell in cells)),
-            _text("state", (cell.state.value for cell in cells)),
-            _counts("runs", (cell.counts[1] for cell in cells)),
-            _counts("passed", (cell.counts[0] for cell in cells)),
+            text_column("entry", (cell.entry for cell in cells)),
+            text_column("condition", (cell.condition for cell in cells)),
+            text_column("state", (cell.state.value for cell in cells)),
+            count_column("runs", (cell.counts[1] for cell in cells)),
+            count_column("passed", (cell.counts[0] for cell in cells)),
             *numbers,
         ]
     )
@@ -307,12 +295,12 @@ def columns_of_runs(ranked: RankingResult) -> Table:
     }  # fmt: skip
     return Table.of_columns(
         [
-            _text("entry", (run.entry for run in runs)),
-            _text("condition", (run.condition for run in runs)),
-            _numbers("amplitude", "rad", (run.amplitude for run in runs)),
-            _text("repeat", (run.repeat for run in runs)),
-            _text("verdict", (state_words(run) for run in runs)),
-            *(_numbers(key, unit, [run[key] for run in runs]) for key, unit in units.items()),
-            _text("key", (run.job and run.job.key for run in runs)),
+            text_column("entry", (run.entry for run in runs)),
+            text_column("condition", (run.condition for run in runs)),
+            number_column("amplitude", "rad", (run.amplitude for run in runs)),
+            text_column("repeat", (run.repeat for run in runs)),
+            text_column("verdict", (state_words(run) for run in runs)),
+            *(number_column(key, unit, [run[key] for run in runs]) for key, unit in units.items()),
+            text_column("key", (run.job and run.job.key for run in runs)),
         ]
     )

@@ -13,7 +13,7 @@ from itertools import combinations
 
 from yawbench.foundation.messages import counted, in_text, listed
 from yawbench.studies.executor import Executor
-from yawbench.studies.tables import Cell, Table, column
+from yawbench.studies.tables import Cell, Table, count_column, number_column, text_column
 
 from .ranking import LoadedRanking
 from .ranking_scores import (
@@ -212,19 +212,15 @@ def columns_of_settings(settings: Sequence[SettingScores]) -> Table:
     """Return columns with a row per setting, controller and condition, in SI units."""
     cells = [(one, cell) for one in settings for score in one.scores for cell in score.cells.values()]
     counts = [cell.counts for _, cell in cells]
+    slips = [None if cell.missing else cell.number("sideslip") for _, cell in cells]
     return Table.of_columns(
         [
-            column("setting", "string", [one.name for one, _ in cells]),
-            column("entry", "string", [cell.entry for _, cell in cells]),
-            column("condition", "string", [cell.condition for _, cell in cells]),
-            column("state", "string", [cell.state.value for _, cell in cells]),
-            column("runs", "int64", [number for _, number in counts]),
-            column("passed", "int64", [passed for passed, _ in counts]),
-            column(
-                "sideslip",
-                "float64",
-                [None if c.missing else c.number("sideslip") for _, c in cells],
-                {"unit": "rad"},
-            ),
+            text_column("setting", (one.name for one, _ in cells)),
+            text_column("entry", (cell.entry for _, cell in cells)),
+            text_column("condition", (cell.condition for _, cell in cells)),
+            text_column("state", (cell.state.value for _, cell in cells)),
+            count_column("runs", (number for _, number in counts)),
+            count_column("passed", (passed for passed, _ in counts)),
+            number_column("sideslip", "rad", slips),
         ]
     )

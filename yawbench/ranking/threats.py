@@ -106,7 +106,7 @@ class ThreatSpec(OverrideSpec):
         return self.model_copy(update={"set": settings})
 
 
-class SettingSpec(OverrideSpec):
+class ThreatSettingSpec(OverrideSpec):
     """Circumstances that are the same for all entries, in which all threats are searched.
 
     What an entry brings with it, such as an allocator of its own, a setting leaves as it is.
@@ -186,7 +186,9 @@ class ThreatsSpec(StrictModel):
     cars: list[str] = Field(min_length=1, description="Names of cars in the ranking file")
     scenarios: dict[str, dict[str, str]] = Field({}, description="Car -> scenario -> scenario in its place")
     threats: dict[str, ThreatSpec] = Field(min_length=1, description="Name -> threat")
-    settings: dict[str, SettingSpec] = Field(min_length=1, description="Name -> setting; the first ranks")
+    settings: dict[str, ThreatSettingSpec] = Field(
+        min_length=1, description="Name -> setting; the first ranks"
+    )
     disciplines: dict[str, DisciplineSpec] = Field(
         {}, description="Name -> test, compared in a table of its own"
     )

@@ -28,7 +28,7 @@ from yawbench.vehicles.motion import largest
 
 from .experiment import LoadedExperiment, NamedRun, experiment_of
 from .experiment_result import ExperimentResult
-from .tables import Cell, Table, column
+from .tables import Cell, Table, number_column, text_column
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -157,12 +157,12 @@ def columns_of(rows: Sequence[ConvergenceRow]) -> Table:
     """Return the rows as columns, in SI units."""
     return Table.of_columns(
         [
-            column("algorithm", "string", [row.algorithm for row in rows]),
-            column("step_size", "float64", [row.step for row in rows], {"unit": "s"}),
-            column("error", "float64", [row.error for row in rows], {"unit": "1"}),
-            column("order", "float64", [row.order for row in rows], {"unit": "1"}),
-            column("wall_time", "float64", [row.wall_time for row in rows], {"unit": "s"}),
-            column("failed", "string", [row.failed for row in rows]),
+            text_column("algorithm", (row.algorithm for row in rows)),
+            number_column("step_size", "s", (row.step for row in rows)),
+            number_column("error", "1", (row.error for row in rows)),
+            number_column("order", "1", (row.order for row in rows)),
+            number_column("wall_time", "s", (row.wall_time for row in rows)),
+            text_column("failed", (row.failed for row in rows)),
         ]
     )
 

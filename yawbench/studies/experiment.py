@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from yawbench.fmus.fmu import Fmu
-from yawbench.foundation.errors import Diagnostic, Location, ScenarioError
+from yawbench.foundation.errors import Location, ScenarioError
 from yawbench.metrics.expressions import STANDARD, TimeWindow, metric, results_to_be, unit_in
 from yawbench.orchestrator.plan import Override, OverrideOrigin, Plan
 from yawbench.orchestrator.results.reader import Results
@@ -30,7 +30,6 @@ from .axes import (
     DesignAxisSpec,
     DesignPoint,
     Level,
-    VariantSpec,
     changes_at,
     crossed,
     grid,
@@ -65,10 +64,11 @@ class NamedRun:
     windows: Mapping[str, TimeWindow] = field(default_factory=dict)
     """Key of a metric -> window [s] in place of the metric's."""
 
-    def scenario_in(self, variant: VariantSpec, folder: Path) -> Path | None:
-        """Return what a variant, of a file in `folder`, puts in place of the scenario; None: nothing."""
-        named = variant.scenario.replace("{scenario}", self.scenario.stem)
-        return folder / named if named else None
+    def scenario_at(self, levels: Iterable[tuple[AxisSpec, Level]], folder: Path) -> Path:
+        """Return its scenario at levels of axes of a file in `folder`; variants may replace it."""
+        variants = (axis.variants[str(level.value)] for axis, level in levels if axis.variants)
+        names = [variant.scenario for variant in variants if variant.scenario]
+        return folder / names[-1].replace("{scenario}", self.scenario.stem) if names else self.scenario
 
 
 @dataclass(frozen=True)
@@ -173,11 +173,7 @@ class LoadedExperiment(LoadedFile):
 
     def scenario_of(self, run: NamedRun, point: DesignPoint) -> Path:
         """Return the scenario of a run at a point."""
-        scenario = run.scenario
-        for axis, level in zip(self.spec.axes.values(), point, strict=True):
-            if axis.variants and any(fnmatchcase(run.name, pattern) for pattern in axis.runs):
-                scenario = run.scenario_in(axis.variants[str(level.value)], self.path.parent) or scenario
-        return scenario
+        return run.scenario_at(self._levels(point, run), self.path.parent)
 
     def setting(self, point: DesignPoint) -> DesignPoint:
         """Return a point without the axes of repeats."""
@@ -242,16 +238,19 @@ class LoadedExperiment(LoadedFile):
             name: sections()[name].load(given, self.path.parent) for name, given in entries.items() if given
         }
 
-    def _at(self, point: DesignPoint, run: NamedRun | None = None) -> list[Override]:
-        """Return the overrides at a point; with `run`, only those of axes that apply to it."""
-        pairs = [
+    def _levels(self, point: DesignPoint, run: NamedRun | None) -> list[tuple[DesignAxisSpec, Level]]:
+        """Return the axes with their levels at a point; with `run`, only those that apply to it."""
+        return [
             (axis, level)
             for axis, level in zip(self.spec.axes.values(), point, strict=True)
             if run is None or any(fnmatchcase(run.name, pattern) for pattern in axis.runs)
         ]
+
+    def _at(self, point: DesignPoint, run: NamedRun | None = None) -> list[Override]:
+        """Return the overrides at a point; with `run`, only those of axes that apply to it."""
         return [
             change
-            for axis, level in pairs
+            for axis, level in self._levels(point, run)
             for change in changes_at(axis, level, self.path.parent, self.origin)
         ]
 
@@ -360,13 +359,10 @@ def plan_experiment(
         ScenarioError: some runs cannot start; lists each error once.
     """
 
-    def about(error: Diagnostic) -> tuple[Hashable, Diagnostic]:
-        """Report an error of an axis once instead of once per value, with its key in the file."""
-        axis = experiment.axis_of(error.location.target)
-        if not axis:
-            return error, error
-        where = Location(experiment.path, target=f"axes.{axis[0]}")
-        return axis, Diagnostic(error.code, str(error), location=where)
+    def cause(place: str) -> tuple[Hashable, Location] | None:
+        """Have an error of an axis reported once instead of once per value, at its key in the file."""
+        axis = experiment.axis_of(place)
+        return axis and (axis, Location(experiment.path, target=f"axes.{axis[0]}"))
 
     axes, cases, runs = bool(experiment.spec.axes), experiment.cases, out / RUNS
 
@@ -377,7 +373,7 @@ def plan_experiment(
         )  # fmt: skip
 
     jobs = (job(case, out) for case in cases)
-    plans = plans_of(jobs, planner=planner, progress=progress, group=about)
+    plans = plans_of(jobs, planner=planner, progress=progress, cause=cause)
     made_up = [*map(results_to_be, plans.kinds)]
     if not experiment.spec.metrics and not any(case.run.test for case in cases):
         standard = {

@@ -18,6 +18,7 @@ from yawbench.foundation.errors import (
     BuildError,
     Diagnostic,
     Interrupted,
+    Location,
     ResultsError,
     ScenarioError,
     YawbenchError,
@@ -186,7 +187,7 @@ def plans_of(
     *,
     planner: Planner | None = None,
     progress: Callable[[int], None] = lambda done: None,
-    group: Callable[[Diagnostic], tuple[Hashable, Diagnostic]] = lambda error: (error, error),
+    cause: Callable[[str], tuple[Hashable, Location] | None] = lambda place: None,
 ) -> StoredPlans:
     """Plan all jobs, so that each of them is known to be able to start.
 
@@ -194,8 +195,8 @@ def plans_of(
         jobs: the runs.
         planner: makes the plans; builds stale FMUs first if its opener does.
         progress: called with the number of jobs planned so far.
-        group: returns what an error is about, and how it is reported; only the first error about a thing
-            is.
+        cause: returns what has made the override that an error is at, and where; only the first error of a
+            thing is reported, there.
 
     Raises:
         BuildError: stale FMUs cannot be built.
@@ -209,9 +210,11 @@ def plans_of(
             _, plan = planned(job, planner)
         except BuildError:
             raise
-        except YawbenchError as error:
-            for diagnostic in error.diagnostics:
-                errors.setdefault(*group(diagnostic))
+        except YawbenchError as problem:
+            for error in problem.diagnostics:
+                thing, where = cause(error.location.target) or (error, None)
+                moved = Diagnostic(error.code, str(error), location=where) if where else error
+                errors.setdefault(thing, moved)
         else:
             plans.add(plan)
         progress(number)

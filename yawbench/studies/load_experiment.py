@@ -55,8 +55,8 @@ SCENARIO = "a scenario"
 """What a name is of, as `catalogue` says it."""
 
 
-def found_studies(folder: Path = SCENARIOS) -> list[Path]:
-    """Return all study files in the subfolders of a folder, sorted by title.
+def found_studies() -> list[Path]:
+    """Return all study files in the subfolders of `SCENARIOS`, sorted by title.
 
     The studies of one folder stay together, `study.yaml` first.
 
@@ -64,11 +64,11 @@ def found_studies(folder: Path = SCENARIOS) -> list[Path]:
         ScenarioError: there are none.
     """
     titles = {
-        path: catalogue.title_of(path) for path, _ in catalogue.files(folder, ["a study file"], depth=2)
+        path: catalogue.title_of(path) for path, _ in catalogue.files(SCENARIOS, ["a study file"], depth=2)
     }
     if not titles:
         raise ScenarioError(
-            f"no study file was named, and there is none in {folder}/*/", code="file-wrong-kind"
+            f"no study file was named, and there is none in {SCENARIOS}/*/", code="file-wrong-kind"
         )
     first = {path.parent: min(titles[p] for p in titles if p.parent == path.parent) for path in titles}
     return sorted(titles, key=lambda path: (first[path.parent], path.stem != "study", titles[path]))

@@ -6,14 +6,14 @@ The runs keep no results. At the chosen point the named runs themselves are used
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Final
 
 from yawbench.fmus.fmu import Value as Given
-from yawbench.foundation.errors import Diagnostic, Location, ScenarioError
+from yawbench.foundation.errors import Location, ScenarioError
 from yawbench.foundation.messages import hint, listed
 from yawbench.metrics.expressions import MetricValue
 from yawbench.metrics.verdict import Verdict
@@ -98,7 +98,7 @@ class RegionRuns:
             return False
         if open_value.kind == "variant":
             folder, variants = self.experiment.path.parent, open_value.variants.values()
-            scenarios = [run.scenario_in(variant, folder) or run.scenario for variant in variants]
+            scenarios = [run.scenario_at([(open_value, level)], folder) for level in levels_of(open_value)]
             targets = [target for variant in variants if not variant.scenario for target in variant.targets]
             return all(path.is_file() for path in scenarios) and self._has(run, targets, open_value.times)
         return self._has(run, open_value.vary, open_value.times)
@@ -114,18 +114,15 @@ class RegionRuns:
     def changes(self, name: str, point: RegionPoint) -> tuple[Path, list[Override]]:
         """Return the scenario of a run at a point, and the further overrides there."""
         run, changes, folder = self.experiment.runs[name], [], self.experiment.path.parent
-        scenario = run.scenario
-        for key, level in point:
-            open_value = self.open_values[key]
+        levels = [(self.open_values[key], level) for key, level in point]
+        for open_value, level in levels:
             if open_value.times:
                 for where in open_value.vary:
                     own = self.own_value(run.name, where)
                     changes.append(Override(where, float(own or 0.0) * float(level.value), ORIGIN))
-                continue
-            if open_value.kind == "variant":
-                scenario = run.scenario_in(open_value.variants[str(level.value)], folder) or scenario
-            changes += changes_at(open_value, level, folder, ORIGIN)
-        return scenario, changes
+            else:
+                changes += changes_at(open_value, level, folder, ORIGIN)
+        return run.scenario_at(levels, folder), changes
 
     def cell(self, name: str, point: RegionPoint) -> RegionCell:
         """Return a run at a point, with only those open values that change it there."""
@@ -276,28 +273,21 @@ def next_jobs(
         if key[0] == "claims":
             wanted |= dict.fromkeys(plan.along(question))
             wanted |= dict.fromkeys(plan.cells(question, _further_points(plan, key, findings, records)))
-    jobs, open_value_of = dict[RegionCell, Job](), dict[str, str]()  # override in words -> open value
+    jobs, causes = dict[RegionCell, Job](), dict[str, tuple[str, Location]]()
     for name, point in wanted:
         if (name, point) in plan.jobs:
             continue
         scenario, own = runs.changes(name, point)
         for key_, level in point:
-            open_value_of |= {str(change): key_ for change in runs.changes(name, ((key_, level),))[1]}
+            where = Location(runs.experiment.path, target=f"region.open_values.{key_}")
+            causes |= {str(change): (key_, where) for change in runs.changes(name, ((key_, level),))[1]}
         label = ", ".join([name, *(f"{key_} {level.words}" for key_, level in point)])
         changes = (*runs.jobs[name].changes, *own)
         job = replace(runs.jobs[name], label=label, scenario=scenario, changes=changes, plan=None)
         jobs[name, point] = replace(job, out=plan.folder / RUNS, keep=False)
 
-    def about(error: Diagnostic) -> tuple[Hashable, Diagnostic]:
-        """Report an error of an open value once, with its key in the file."""
-        key = open_value_of.get(error.location.target)
-        if key is None:
-            return error, error
-        where = Location(runs.experiment.path, target=f"region.open_values.{key}")
-        return key, Diagnostic(error.code, str(error), location=where)
-
     metrics = metrics_of(runs.experiment)
-    planned = ready([*jobs.values()], planner=plan.planner, progress=progress, group=about)
+    planned = ready([*jobs.values()], planner=plan.planner, progress=progress, cause=causes.get)
     made = [keyed(job, metrics) for job in planned]
     plan.jobs |= zip(jobs, made, strict=True)
     return made

@@ -56,22 +56,18 @@ class DistributionDrawing(SampleDrawing):
         self.across = f"{self.measured}, less that of {spec.against}" if spec.against else self.measured
         self._drawn = 0
 
-    def _baseline(self, of: Group) -> Group | None:
-        """Return the group that a group's differences are from; None if it is that itself."""
-        lines = self.spec.lines
-        others = [(name, level) for name, level in of.levels if name != lines]
-        for group in self.groups:
-            alike = group.run is of.run and all(pair in group.levels for pair in others)
-            if alike and self._is_of(group.cases[0], lines, {self.spec.against}):
-                return None if group is of else group
-        return None
+    def _baseline(self, of: Group) -> Group:
+        """Return the group that a group's differences are from, which may be that itself."""
+        others = {pair for pair in of.levels if pair[0] != self.spec.lines}
+        alike = (group for group in self.groups if group.run is of.run and others <= {*group.levels})
+        return next(g for g in alike if self._is_of(g.cases[0], self.spec.lines, {self.spec.against}))
 
     def fill(self, axes: Axes, runs: Sequence[Case]) -> None:
         for group, _, style in self.grouped(runs):
             if self.spec.against:
-                other = self._baseline(group)
-                numbers = np.empty(0) if other is None else subtracted(
-                    self.findings, group, other, self.spec.metric)  # fmt: skip
+                if (other := self._baseline(group)) is group:
+                    continue
+                numbers = subtracted(self.findings, group, other, self.spec.metric)
             else:
                 every = independent(self.findings, numbers_of(self.findings, group, self.spec.metric))
                 numbers = every[np.isfinite(every)]

@@ -113,6 +113,21 @@ def column(
     return Column(heading, kind, about or {}), cells
 
 
+def text_column(heading: str, values: Iterable[object]) -> tuple[Column, Sequence[Cell]]:
+    """Return a column of texts, empty where there is none."""
+    return column(heading, "string", [None if value is None else str(value) for value in values])
+
+
+def count_column(heading: str, values: Iterable[int | None]) -> tuple[Column, Sequence[Cell]]:
+    """Return a column of counts."""
+    return column(heading, "int64", list(values))
+
+
+def number_column(heading: str, unit: str, values: Iterable[float | None]) -> tuple[Column, Sequence[Cell]]:
+    """Return a column of numbers in an SI unit."""
+    return column(heading, "float64", list(values), {"unit": unit})
+
+
 def _shown(cell: Cell, unit: str = "") -> str:
     if cell is None:
         return "-"
