@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from yawbench.commands.evaluate import DRIVE, EvaluatedRuns, angle_of
 from yawbench.commands.json_and_latex import tabular
 from yawbench.commands.options import CHANGES, MAKING, RunOptions, executor_of, takes
 from yawbench.commands.strict_and_junit import judging
@@ -20,7 +21,6 @@ from yawbench.proving_ground.standard_tests import DRIVEN, TESTS
 if TYPE_CHECKING:
     from yawbench.orchestrator.plan import Override
     from yawbench.studies.executor import Executor
-from yawbench.commands.evaluate import DRIVE, EvaluatedRuns, angle_of
 
 GROUND = "proving_ground"
 """Folder of the standard tests' scenarios."""

@@ -29,8 +29,6 @@ if TYPE_CHECKING:
 
 VERSION = 1
 """Version of the JSON object; increased when a field changes its meaning or is removed."""
-
-
 Form = Literal["text", "json", "latex"]
 
 
@@ -130,8 +128,6 @@ def _stdout_to_stderr() -> Iterator[None]:
 Json = Annotated[
     bool, typer.Option("--json", help="Print one JSON object to standard output, see docs/editors.md.")
 ]
-
-
 Latex = Annotated[bool, typer.Option("--latex", help="Print tables for LaTeX, with the package booktabs.")]
 
 

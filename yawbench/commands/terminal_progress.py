@@ -24,8 +24,6 @@ if TYPE_CHECKING:
 
 SHOWN = 10
 """Failed runs named on the terminal; all are in the table."""
-
-
 SILENCE = 30.0
 """Longest time [s] without a line where stderr is not a terminal. Chosen: readers of a log take a minute for
 a hang, and a night of lines is a page."""
@@ -65,15 +63,9 @@ class _Log:
 
 
 _LOG = _Log()
-
-
 PATIENCE = 2.0
 """Time [s] after which a command says what it is at. Chosen: readers of a terminal take more for a hang."""
-
-
 OPENING = "opening the FMUs"
-
-
 BUILDING = f"{OPENING}, and building those that are missing or whose sources have changed: seconds each"
 
 

@@ -8,15 +8,6 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from yawbench.commands import json_and_latex
-from yawbench.commands.json_and_latex import tabular
-from yawbench.commands.options import CHANGES, MAKING, RunOptions, executor_of, named, pooled, takes
-from yawbench.commands.output import print_tables
-from yawbench.commands.terminal_progress import hold, stoppable
-from yawbench.foundation import plugins
-
-if TYPE_CHECKING:
-    from yawbench.studies.experiment import LoadedExperiment
-    from yawbench.studies.experiment_result import ExperimentResult
 from yawbench.commands.experiments import (
     chapter_of,
     command_of,
@@ -27,6 +18,15 @@ from yawbench.commands.experiments import (
     say_problems,
     write_page,
 )
+from yawbench.commands.json_and_latex import tabular
+from yawbench.commands.options import CHANGES, MAKING, RunOptions, executor_of, named, pooled, takes
+from yawbench.commands.output import print_tables
+from yawbench.commands.terminal_progress import hold, stoppable
+from yawbench.foundation import plugins
+
+if TYPE_CHECKING:
+    from yawbench.studies.experiment import LoadedExperiment
+    from yawbench.studies.experiment_result import ExperimentResult
 
 TuningFile = Annotated[
     Path, named("a tuning file", help="Tuning: YAML file, or a name in scenarios/.", metavar="TUNING")

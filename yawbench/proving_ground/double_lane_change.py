@@ -26,8 +26,6 @@ from .standard_tests import Evaluation, SeriesDriver, SeriesRun, TestSeries, eva
 from .trace import Trace, at, first_crossing
 
 CLEAN = "clean"
-
-
 TOUCH = 1e-9
 """Overrun above which a cone counts as hit [m]."""
 
@@ -74,12 +72,8 @@ def evaluate_lane_change(judged: Evaluation, trace: Trace) -> None:
 
 
 KMH = 1.0 / 3.6
-
-
 SEARCH_STEP, RESOLUTION = 10.0 * KMH, 0.5 * KMH
 """Step of the coarse search for the entry speed, and its final resolution [m/s]."""
-
-
 LOWEST, HIGHEST = 10.0 * KMH, 250.0 * KMH
 """Bounds of the search for the entry speed [m/s]."""
 

@@ -38,16 +38,10 @@ from .trace import SLOWEST, Trace, at, first_crossing, known, opposed, refuse_op
 
 STEADY = 1.0
 """Time at the end of the record over which steady values are averaged [s]."""
-
-
 STEP_SHARE = 0.9
 """Fraction of the steady value at which the response time ends."""
-
-
 SETTLED = 0.02
 """Largest range of a steady signal, relative to its mean; chosen."""
-
-
 RESPONSES = {
     "yaw_rate": ("yaw rate", "rad/s", "1/s"),
     "acceleration_y": ("lateral acceleration", "m/s2", "m/(s2.rad)"),
@@ -107,14 +101,8 @@ def _since(instant: float | None, zero: float) -> float | None:
 
 FREQUENCIES = (0.2, 0.5, 1.0, 1.5, 2.0)
 """Frequencies of the reported gains and phases [Hz]."""
-
-
 GRID = np.arange(0.2, 3.001, 0.02)
-
-
 HALF_BAND = 0.05
-
-
 LEAST = 0.01
 """Power of the hand wheel, relative to its largest, below which a frequency is left out."""
 

@@ -10,14 +10,8 @@ from collections.abc import Callable, Generator, Mapping
 from typing import TypeVar
 
 T = TypeVar("T")
-
-
 K = TypeVar("K")
-
-
 V = TypeVar("V")
-
-
 Search = Generator[V, bool, T]
 """A search for a limit: yields values, is sent whether each of them passes, and returns its result."""
 

@@ -10,28 +10,21 @@ from typing import TYPE_CHECKING
 
 from yawbench.foundation.messages import printable
 
-if TYPE_CHECKING:
-    import rich.console
-    import rich.segment
 from .run_remarks import MARK
 from .tables import Table
 
+if TYPE_CHECKING:
+    import rich.console
+    import rich.segment
+
 MIN_HEADING = 12
 """Characters after which a heading over numbers is wrapped."""
-
-
 NAME = 32
 """Widest text on the terminal that is not broken over lines without need. Chosen: most names."""
-
-
 WORDS = 20
 """Widest text that is not broken at all, and the narrowest column of longer ones. Chosen: all verdicts."""
-
-
 GAP = 3
 """Distance between columns on the terminal."""
-
-
 RULE = "─"
 """The line below headings on the terminal."""
 
