@@ -126,9 +126,14 @@ class EscController(Component):
     inputs = SEEN
     outputs = (
         output("yaw_moment", *SEEN),
-        "engine_reduction",
+        output("engine_reduction", *SEEN),
         output("brake_preparation", *SEEN),
-        output("stability_state", unit="1", text="State of the supervisor: 0 off, 1 oversteer, 2 understeer"),
+        output(
+            "stability_state",
+            *SEEN,
+            unit="1",
+            text="State of the supervisor: 0 off, 1 oversteer, 2 understeer",
+        ),
         output("sideslip_excess", *SEEN, unit="rad", text="Sideslip, foreseen, beyond its bound"),
     )
 

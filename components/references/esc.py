@@ -81,7 +81,11 @@ class EscReference(SingleTrack):
     outputs = (
         *(output(name, *SEEN) for name in SHOWN),
         output(
-            "friction_shown", *SEEN, unit="1", text="Friction coefficient mu_s that a_y shows, from above"
+            "friction_shown",
+            "velocity_x",
+            "acceleration_y",
+            unit="1",
+            text="Friction coefficient mu_s that a_y shows, from above",
         ),
     )
 

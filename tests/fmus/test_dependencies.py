@@ -27,6 +27,7 @@ FORCES = {"steer_angle", "yaw_moment", "slope", "bank", "wind_force_y", "wind_mo
     f"tyre_{signal}_{wheel}" for signal in ("force_x", "force_y", "moment_z") for wheel in WHEELS
 }
 SLOW = {
+    "controller_esc",
     "estimator_kinematic",
     "estimator_observer",
     "monitor_parity",
@@ -34,7 +35,7 @@ SLOW = {
     "sensor_poor",
     "sensor_production",
 }
-RARE = {"controller_esc", "reference_esc", "wheel_control_esc", "wheel_control_slip"}
+RARE = {"reference_esc", "wheel_control_esc", "wheel_control_slip"}
 """Units some of whose dependencies show in few states: they are sought in the second tier."""
 GIVEN = {
     "road_patchwork": {
@@ -131,8 +132,8 @@ def test_declared_dependencies_are_exactly_those_found(name, trials):
 
     For a unit that samples, all that shows there is direct: it knows nothing of what happens in
     between. In the others the inputs may have been integrated, so there it proves nothing. An estimator
-    follows by what it has learned straight ahead, too, and sensors answer late, of which so short a drive
-    shows little.
+    follows by what it has learned straight ahead, too, sensors answer late, and a supervisor confirms before
+    it acts, of which so short a drive shows little.
     """
     component = component_class(name)
     source = random.Random(name)

@@ -208,10 +208,7 @@ def test_zig_compiles_for_every_platform(tmp_path):
     report = build_all(tmp_path, components=["controller_off"], edition=Edition(3, every))
     assert report.not_on_windows == []
     with zipfile.ZipFile(tmp_path / "controller_off.fmu") as archive:
-        heads = {
-            path.split("/")[1]: archive.read(path)[:4] for path in archive.namelist() if "binaries/" in path
-        }
-    assert heads == {
-        "x86_64-linux": b"\x7fELF", "aarch64-linux": b"\x7fELF", "x86_64-windows": b"MZ\x90\x00"[:4],
-        "x86_64-darwin": b"\xca\xfe\xba\xbe", "aarch64-darwin": b"\xca\xfe\xba\xbe",
-    }  # fmt: skip
+        heads = {path.split("/")[1]: archive.read(path) for path in archive.namelist() if "binaries/" in path}
+    magic = {"linux": b"\x7fELF", "windows": b"MZ", "darwin": b"\xca\xfe\xba\xbe"}
+    assert heads.keys() == {*every, "x86_64-linux"}
+    assert all(head.startswith(magic[name.split("-")[1]]) for name, head in heads.items())
