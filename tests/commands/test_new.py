@@ -91,15 +91,13 @@ def test_an_exercise_is_failed_as_it_begins_and_passed_with_a_law(project):
     units, build, test, study, mark = [shlex.split(line) for line in out.splitlines()]
     law = folder / "controllers" / "hold.py"
     begun = law.read_text()
-    results = []
-    for text in (begun, begun.replace("return 0.0  # your part", "return 2e4 * (yaw_rate_ref - yaw_rate)")):
-        law.write_text(text)
-        done = [called(folder, *command) for command in (build, test, study, mark)]
-        assert [status for status, *_ in done[::2]] == [0, 0], [said for *_, said in done]
-        record = json.loads((folder / "results/hold/exercise/experiment.json").read_text())
-        marks = (folder / "exercises/hold/marks.csv").read_text().splitlines()[1].split(",")
-        results.append((done[1][0], [check["holds"] for check in record["checks"]], done[3][0], marks[2]))
-    assert results == [(1, [False, True, False], 1, "fail"), (0, [True, True, True], 0, "pass")]
+    assert [called(folder, *command)[0] for command in (build, test)] == [0, 1]
+    law.write_text(begun.replace("return 0.0  # your part", "return 2e4 * (yaw_rate_ref - yaw_rate)"))
+    done = [called(folder, *command) for command in (build, test, study, mark)]
+    assert [status for status, *_ in done] == [0, 0, 0, 0], [said for *_, said in done]
+    record = json.loads((folder / "results/hold/exercise/experiment.json").read_text())
+    assert [check["holds"] for check in record["checks"]] == [True, True, True]
+    assert (folder / "exercises/hold/marks.csv").read_text().splitlines()[1].split(",")[2] == "pass"
     marking = folder / "exercises/hold/mark.py"
     marking.write_text(re.sub(r"LIMIT = .*", "LIMIT = 3.0", marking.read_text()))
     asleep = begun.replace("return 0.0  # your part", "__import__('time').sleep(60)")
