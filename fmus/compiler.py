@@ -178,7 +178,10 @@ def compiler_version(command: Sequence[str]) -> str:
             "'pip install yawbench[compiler]'",
             code="compiler-missing",
         )
-    return subprocess.run([*command, "--version"], capture_output=True, text=True, check=False).stdout
+    with tempfile.TemporaryDirectory() as folder:  # Zig for macOS leaves an object file where it is asked
+        return subprocess.run(
+            [*command, "--version"], cwd=folder, capture_output=True, text=True, check=False
+        ).stdout
 
 
 def can_compile() -> bool:

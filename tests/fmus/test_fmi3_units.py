@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import subprocess
 import sys
@@ -203,8 +204,10 @@ def test_a_build_says_what_has_no_native_library_for_windows(tmp_path, monkeypat
 
 @pytest.mark.exhaustive
 @pytest.mark.skipif(zig_command("x") is None, reason="ziglang is not installed")
-def test_zig_compiles_for_every_platform(tmp_path):
+def test_zig_compiles_for_every_platform(tmp_path, monkeypatch):
     every = ("aarch64-darwin", "aarch64-linux", "x86_64-darwin", "x86_64-windows")
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
     report = build_all(tmp_path, components=["controller_off"], edition=Edition(3, every))
     assert report.not_on_windows == []
     with zipfile.ZipFile(tmp_path / "controller_off.fmu") as archive:
@@ -212,3 +215,4 @@ def test_zig_compiles_for_every_platform(tmp_path):
     magic = {"linux": b"\x7fELF", "windows": b"MZ", "darwin": b"\xca\xfe\xba\xbe"}
     assert heads.keys() == {*every, "x86_64-linux"}
     assert all(head.startswith(magic[name.split("-")[1]]) for name, head in heads.items())
+    assert not os.listdir(tmp_path / "elsewhere")  # nothing of the compiler is left where the user is
