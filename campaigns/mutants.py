@@ -321,7 +321,8 @@ def existing(checkout: Path, tests: Iterable[str]) -> list[str]:
     for test in tests:
         file, _, name = test.partition("::")
         function = name.partition("[")[0].split("::")[-1]
-        if (checkout / file).exists() and f"def {function}" in (checkout / file).read_text(encoding="utf-8"):
+        text = (checkout / file).read_text(encoding="utf-8") if (checkout / file).exists() else None
+        if text is not None and (not function or f"def {function}(" in text):
             kept.append(test)
     return kept
 

@@ -21,12 +21,14 @@ remaining biases in cars are up to 0.3 deg/s and 0.2 m/s2.
 Sources are given with the parameters. `sensors.ideal` and `sensors.poor` are the same with other values.
 """
 
+from math import cos, sin
+
+from yawbench.vocabulary.gravity import G
 from yawbench.vocabulary.signals import SIGNALS
 from yawbench.vocabulary.wheels import wheels
 
 from ..fmi.component import Component
 from ..fmi.variables import output, parameter, signal
-from ..sensing.accelerometers import felt
 from ..sensing.channel import Channel, ChannelSpec
 from ..sensing.cluster_parameters import Figures, figures_of, parameters_of
 from ..sensing.noise import key
@@ -139,5 +141,7 @@ class Production(Component):
         """Return the physical inputs of the sensors, in the order of the outputs; equation (1)."""
         r, a_x, a_y, *others, roll, pitch, slope, bank = u
         if self.p.feels_gravity:
-            a_x, a_y = felt(a_x, a_y, pitch - slope, roll + bank)
+            theta, phi = pitch - slope, roll + bank
+            a_x = a_x * cos(theta) - G * sin(theta)
+            a_y = a_y * cos(phi) + G * sin(phi)
         return [r, a_x, a_y, *others]

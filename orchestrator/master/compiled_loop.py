@@ -24,6 +24,8 @@ WANTED = "YAWBENCH_LOOP"
 """Environment variable: `python` asks for the loop in Python."""
 PAUSE = 20_000_000
 """Time after which a walk returns to Python [ns]; chosen: too short to notice after Ctrl-C."""
+CHECKED = -2
+"""`WalkState.at` once the outputs of a step have been checked, and before it is recorded."""
 EXACT = 2**53
 """Whole numbers below this are exact in double precision, and their quotients correctly rounded."""
 

@@ -30,7 +30,7 @@ from yawbench.foundation.processes import end_copy_of
 
 from ..plan import Plan
 from .arithmetic import Arithmetic
-from .compiled_loop import Answer, CompiledLoop, missing_loop
+from .compiled_loop import CHECKED, Answer, CompiledLoop, missing_loop
 from .initialization import initialize
 from .instance import Buffers, FmuInstance, PlainCall, Status
 from .log import DISCARD, KILLED, MASTER, OK, WARNING, Log, describe, suspects
@@ -238,7 +238,7 @@ class Master:
             elif answer == Answer.NOT_FINITE:
                 self._check_finite(k)
                 loop.expect(self._expected)
-                state.at = -2  # go on with recording the step
+                state.at = CHECKED
             elif answer in (Answer.PYTHON, Answer.STATUS):
                 operation = self._operations[k % cycle][state.at]
                 call = operation.call

@@ -118,7 +118,7 @@ def names(kind: str) -> list[str]:
 
 def named(name: str | Path, kind: str = "") -> Path | None:
     """Return the file with a name, in the working folder or a folder of scenarios, None if there is none."""
-    return _first(name, kind, [Path(), *folders()])
+    return _first(name, "", [Path()]) or _first(name, kind, folders())
 
 
 def beside(file: Path, name: str, kind: str) -> Path:
@@ -129,7 +129,7 @@ def beside(file: Path, name: str, kind: str) -> Path:
     path = Path(os.path.normpath(file.parent / name))
     if Path(name).suffix in ENDINGS or os.path.exists(path):
         return path
-    if near := _first(path.name, kind, [path.parent]):
+    if near := _first(path.name, "", [path.parent]):
         return near
     found = _first(name, kind, folders())
     return found.absolute() if found else path

@@ -85,13 +85,14 @@ def test_a_scenario_with_the_name_of_a_vehicle_file_is_not_taken_for_it(tmp_path
     for file in (own / "van.yaml", own / "vehicles" / "van.yaml"):
         file.parent.mkdir(exist_ok=True)
         file.write_text("title: a van\n")
-    for here in (tmp_path, own):
-        monkeypatch.chdir(here)
-        assert catalogue.find("van", "a vehicle file").samefile(own / "vehicles" / "van.yaml")
-        assert catalogue.find("van", "a scenario").samefile(own / "van.yaml")
-        for file in (own / "sine.yaml", own / "deep" / "sine.yaml"):
-            vehicle = catalogue.beside(file, "van", "a vehicle file")
-            assert vehicle.samefile(own / "vehicles" / "van.yaml")
+    monkeypatch.chdir(tmp_path)
+    assert catalogue.find("van", "a vehicle file").samefile(own / "vehicles" / "van.yaml")
+    assert catalogue.find("van", "a scenario").samefile(own / "van.yaml")
+    vehicle = catalogue.beside(own / "deep" / "sine.yaml", "van", "a vehicle file")
+    assert vehicle.samefile(own / "vehicles" / "van.yaml")
+    for near in ("scenarios/van", "./scenarios/van"):  # a path leads to the file that it names
+        assert catalogue.find(near, "a vehicle file").samefile(own / "van.yaml")
+    assert catalogue.beside(own / "deep" / "sine.yaml", "../van", "a vehicle file").samefile(own / "van.yaml")
 
 
 @pytest.mark.parametrize(

@@ -17,26 +17,25 @@ from yawbench.orchestrator.signal_names import Target
 from yawbench.proving_ground.sine_with_dwell import AMPLITUDE, SIDES, amplitudes
 from yawbench.proving_ground.standard_tests import Evaluation
 from yawbench.proving_ground.steady_state_steering import characteristic_angle, slow_steer_amplitude
-from yawbench.studies.axes import (
-    DesignAxisSpec,
-    Level,
-    axis_of_levels,
-)
+from yawbench.studies.axes import DesignAxisSpec, Level, axis_of_levels
 from yawbench.studies.claim_schema import MetricSpec, text_of
 from yawbench.studies.executor import Executor
 from yawbench.studies.experiment import LoadedExperiment, NamedRun, experiment_of
 from yawbench.studies.experiment_result import ExperimentResult
 
-from .ranking import (
-    METRICS,
-    SERIES,
-    SLOW,
-    STEERING_BEGINS,
-    ConditionSpec,
-    LoadedRanking,
-    OrdinarySpec,
-    Repeated,
-)
+from .ranking import SERIES, ConditionSpec, LoadedRanking, OrdinarySpec
+
+SLOW = "slowly-increasing-steer"
+METRICS = {
+    "intervention": "effort(wheel_torque_*)",
+    "effort": "effort(yaw_moment)",
+    "chatter": "total_variation_rate(yaw_moment)",
+}
+"""Metrics besides the test's; the intervention begins with steering: before, wheel torque is the driver's."""
+STEERING_BEGINS = "start_time"
+"""Parameter of the driver: beginning of steer [s]."""
+Repeated = Mapping[str, ConditionSpec | OrdinarySpec]
+"""Name of a run -> what may repeat it."""
 
 
 def angle_experiment(

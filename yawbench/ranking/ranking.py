@@ -42,12 +42,7 @@ from yawbench.orchestrator.plan import Override
 from yawbench.orchestrator.scenario import catalogue, yaml_lines
 from yawbench.orchestrator.scenario.schema import Scalar
 from yawbench.orchestrator.scenario.schema_validation import StrictModel, Time, validated
-from yawbench.studies.axes import (
-    DesignAxisSpec,
-    OverrideSpec,
-    VariantSpec,
-    changes_of_file,
-)
+from yawbench.studies.axes import DesignAxisSpec, OverrideSpec, VariantSpec, changes_of_file
 from yawbench.studies.experiment import LoadedFile
 
 CONTROLLER = "controller"
@@ -196,15 +191,7 @@ class RankingSpec(StrictModel):
             yield f"ordinary.{key}.cars", ordinary.cars, self.cars
 
 
-SERIES, SLOW = "sine-with-dwell", "slowly-increasing-steer"
-METRICS = {
-    "intervention": "effort(wheel_torque_*)",
-    "effort": "effort(yaw_moment)",
-    "chatter": "total_variation_rate(yaw_moment)",
-}
-"""Metrics besides the test's; the intervention begins with steering: before, wheel torque is the driver's."""
-STEERING_BEGINS = "start_time"
-"""Parameter of the driver: beginning of steer [s]."""
+SERIES = "sine-with-dwell"
 RECORDED = (
     "steering_wheel_angle*", "yaw_rate*", "sideslip*", "acceleration_y*", "velocity_x*", "velocity_y*",
     "yaw_moment*", "wheel_torque*", "torque_request*", "position_x*", "position_y*", "yaw_angle*",
@@ -339,7 +326,3 @@ def load_ranking(
                 code="condition-unknown",
             )
     return LoadedRanking(path, spec, entries, quick, tuple(chosen))
-
-
-Repeated = Mapping[str, ConditionSpec | OrdinarySpec]
-"""Name of a run -> what may repeat it."""

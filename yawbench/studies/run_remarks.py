@@ -1,9 +1,8 @@
-"""Remarks below tables of runs: plausibility warnings, and why cars were lost."""
+"""Remarks on runs in tables: marks of plausibility warnings, and below why cars were lost."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING
 
 from yawbench.events.kinds import events_in
 from yawbench.events.why import lost_among
@@ -11,12 +10,7 @@ from yawbench.foundation.errors import text_of
 from yawbench.orchestrator.results.reader import Results
 from yawbench.orchestrator.results.run_record import EventRecord
 
-if TYPE_CHECKING:
-    pass
-
-
-MARK = "†"
-"""Mark after the name of a run with plausibility warnings."""
+from .tables import MARK
 
 
 def marked(label: str, results: Results) -> str:

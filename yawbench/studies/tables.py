@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
+MARK = "†"
+"""Mark after the name of a run with plausibility warnings."""
 Cell = str | MetricValue | float | None
 """A table cell: text, a number with its unit or in that of its column, or None if empty."""
 Kind = Literal["int64", "float64", "string"]

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING
 
 from yawbench.foundation.messages import printable
 
-from .run_remarks import MARK
-from .tables import Table
+from .tables import MARK, Table
 
 if TYPE_CHECKING:
     import rich.console
