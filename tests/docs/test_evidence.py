@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import sys
 
 from tests.checkout import ROOT
@@ -18,4 +19,8 @@ def test_the_page_tells_every_figure_under_a_heading_of_its_own_and_its_test_is_
     assert record.keys() == set(evidence.CHAPTERS)
     assert evidence.page().count("| `test_") == len(entries) > 20
     for file, _, name in (entry["test"].partition("::") for entry in entries):
-        assert f"def {name}(" in (ROOT / file).read_text(encoding="utf-8"), f"its figures go from {FILE.name}"
+        text = (ROOT / file).read_text(encoding="utf-8")
+        body = re.search(rf"^def {name}\(.*?(?=^\S|\Z)", text, re.M | re.S)
+        assert body and "measured(" in body[0], f"its figures go from {FILE.name}"
+    for entry in entries:
+        assert entry["figure"] >= entry["limit"] if entry["at_least"] else entry["figure"] <= entry["limit"]

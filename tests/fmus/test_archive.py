@@ -27,7 +27,7 @@ from yawbench.fmus.build import HERE as FMUS
 from yawbench.fmus.build_stamp import read_stamp
 from yawbench.fmus.check import reference_files
 from yawbench.fmus.compiler import compile_launcher
-from yawbench.fmus.packing import to_bytes
+from yawbench.fmus.packing import set_guid, to_bytes
 from yawbench.fmus.reference_result import FOLDER
 from yawbench.foundation.errors import BuildError
 from yawbench.foundation.workers import Finished, Pool
@@ -358,3 +358,9 @@ def test_an_fmu_whose_run_fails_has_no_reference_result(tmp_path):
     fmu = tmp_path / "none.fmu"
     fmu.write_bytes(b"no FMU")
     assert reference_files(fmu) == {}
+
+
+def test_the_guid_follows_the_description_and_the_files():
+    descriptions = [ElementTree.Element("fmiModelDescription", modelName=name) for name in "ab"]
+    made = {set_guid(one, {"binary": content}) for one in descriptions for content in (b"1", b"2")}
+    assert len(made) == 4

@@ -5,6 +5,8 @@ from __future__ import annotations
 import errno
 import json
 import os
+import subprocess
+import sys
 import time
 import zipfile
 from pathlib import Path
@@ -292,3 +294,14 @@ def test_a_pipe_in_place_of_an_fmu_is_not_waited_for(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe.fmu")
     with refused(ModelDescriptionError, "fmu-damaged", names=("pipe.fmu", "socket", "device")):
         open_fmu(tmp_path / "pipe.fmu")
+
+
+@pytest.mark.exhaustive
+def test_processes_that_unpack_at_the_same_time_do_not_collide(fmu: Path, cache: Path) -> None:
+    code = "import sys; from yawbench.fmus.archive import open_fmu; print(open_fmu(sys.argv[1]).directory)"
+    command = [sys.executable, "-c", code, str(fmu)]
+    started = [subprocess.Popen(command, stdout=subprocess.PIPE, text=True) for _ in range(2)]
+    said = {process.communicate()[0].strip() for process in started}
+    assert [process.returncode for process in started] == [0] * 2
+    assert said == {str(open_fmu(fmu).directory)}
+    assert len(list(cache.iterdir())) == 1

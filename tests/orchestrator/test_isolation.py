@@ -144,7 +144,9 @@ def test_an_end_without_a_word_is_a_sentence_and_the_results_so_far(act, argumen
     assert mentions(said, "controller", "0.05 s", *names)
     assert results.record.status == "failed"
     assert results.record.error.instance == "controller"
-    assert results.time[-1] in (0.05, 0.051)  # the controller takes two steps at once
+    assert results.time[-1] in (
+        (0.05, 0.051) if isolate else (0.051,)
+    )  # the controller takes two steps at once
     assert np.all(np.isfinite(results["plant.velocity_x"]))
 
 

@@ -836,3 +836,13 @@ def test_a_parameter_that_is_text_can_come_from_a_file(folder):
     ):
         where = f"a.yaml:8: units.road.parameters.{given.partition(':')[0]}"
         assert told(problems(with_road(given)), f"{code} | {where} | {names}")
+
+
+def test_a_scenario_is_wired_anew_when_its_fmu_has_been_mended(folder):
+    loaded = load_scenario(scenario())
+    good = (folder / "tyre_dugoff.fmu").read_bytes()
+    make_fmu(folder / "tyre_dugoff.fmu", inputs=[Var("slip_angle_*", "rad")], outputs=[out("grip", unit="N")])
+    with refused(WiringError, "input-undriven"):
+        make_plan(loaded)
+    (folder / "tyre_dugoff.fmu").write_bytes(good)
+    assert make_plan(loaded).wires == make_plan(load_scenario(scenario())).wires

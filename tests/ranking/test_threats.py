@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from tests.checkout import ROOT
+from tests.command_line import status_of
 from tests.ranking.test_ranking import SMALL as RANKING
 from tests.ranking.test_ranking import rows
 from tests.refusals import mentions
@@ -373,3 +374,20 @@ def test_disciplines_stand_beside_the_threats_and_entries_that_did_not_drive_the
     assert rows_of_all["fuzzy PID"] == [None, "100 (1)", "50 (1)"]
     assert rows_of_all["new"] == [None, "60 (1)", None]
     assert {row[3] for row in table.rows} == {None}, "one car says nothing about others"
+
+
+@pytest.mark.exhaustive
+def test_entries_of_ones_own_are_driven_from_nothing(tmp_path, capsys):
+    (tmp_path / "ranking.yaml").write_text(RANKING)
+    (tmp_path / "threats.yaml").write_text(SMALL)
+    status = status_of("rank", tmp_path / "threats.yaml", "--out", tmp_path / "out", "--jobs", 1)
+    assert status == 0, capsys.readouterr().err
+    levels = {one["entry"]: one for one in rows(tmp_path / "out" / "levels.csv")}
+    assert levels["none"]["end"] == "easy"
+    assert levels["fuzzy_pid"]["end"] == ""
+    assert 0.1 < float(levels["fuzzy_pid"]["level"]) < 0.9
+    scores = rows(tmp_path / "out" / "scores.csv")
+    assert [(one["entry"], float(one["score"])) for one in scores] == [("fuzzy_pid", 100.0), ("none", 0.0)]
+    page = unpacked(tmp_path / "out" / "report.html")
+    assert "fuzzy PID" in page
+    assert "fails at 0.90" in page

@@ -57,6 +57,8 @@ class Moody(Component):
             raise ValueError("twenty is too much")
         if level == 30:
             os.kill(os.getpid(), signal.SIGKILL)
+        while level == 35:
+            time.sleep(1)
         if level in (40, 50) and not (HERE / str(int(level))).exists():
             (HERE / str(int(level))).touch()
             os.kill(os.getpid(), signal.SIGKILL if level == 40 else signal.SIGTERM)
@@ -389,3 +391,19 @@ def test_runs_that_were_never_made_are_not_called_failed(moods, yawbench, tmp_pa
     assert (status, "not made" in out + said) == (1, False)
     assert "level 20" in said
     assert "failed: controller" in said
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="--isolate needs Linux or macOS")
+def test_a_run_that_hangs_in_isolation_is_a_row_that_names_the_unit(moods, yawbench, tmp_path):
+    assert yawbench(moods(10, 35), "out", "--isolate", "--call-limit", "500 ms")[0] == 1
+    calm, hung = rows(tmp_path / "out")[::2]
+    assert calm["reason"] is None
+    assert mentions(hung["reason"], "controller", "0.5 s")
+
+
+def test_the_table_is_the_same_to_the_byte_however_many_workers(moods, yawbench, tmp_path):
+    file = moods(5, 20)
+    for workers in "13":
+        assert yawbench(file, workers, "--jobs", workers)[0] == 1  # level 20 fails
+    one, three = ((tmp_path / workers / "table.parquet").read_bytes() for workers in "13")
+    assert one == three
