@@ -81,15 +81,20 @@ def verdict_columns(findings: ExperimentResult) -> Table:
     columns = [Column(name, kind, {"unit": "1"} if name in shares else {}) for name, kind in kinds.items()]
     rows = []
     for result in findings.judgements:
-        of_region: list[Cell] = [None] * 11
+        row: dict[str, Cell] = {
+            "group": result.group, "says": result.claim.says, "verdict": verdict(result),
+            "margin": result.verdict.margin,
+        }  # fmt: skip
         if region := result.region:
             bounds, flip = region.flip_bounds, region.flip
-            of_flip = (flip.open_value, flip.words, flip.chosen or None) if flip else (None, None, None)
-            of_region = [
-                region.spread, len(region.points), region.holding, region.flipping, bounds.low, bounds.high,
-                region.without_result, *of_flip, text_of(region.robust),
-            ]  # fmt: skip
-        rows.append([result.group, result.claim.says, verdict(result), result.verdict.margin, *of_region])
+            row |= {
+                "spread": region.spread, "points": len(region.points), "holds at": region.holding,
+                "flips": region.flipping, "share from": bounds.low, "share to": bounds.high,
+                "without result": region.without_result, "robust": text_of(region.robust),
+            }  # fmt: skip
+            if flip:
+                row |= {"flips by": flip.open_value, "flips at": flip.words, "chosen": flip.chosen or None}
+        rows.append([row.get(name) for name in kinds])
     return Table("", columns, rows)
 
 
